@@ -42,6 +42,28 @@ def test_each_half_of_a_picture_follows_the_source_that_is_right_there(height, w
     np.testing.assert_array_equal(motion[..., 0], -motion[..., 2])
 
 
+@pytest.mark.parametrize("margin, is_taken", [(1.0, False), (1.5, True)])
+def test_the_other_source_may_match_worse_up_to_the_margin(margin, is_taken):
+    """The picture moves by 2 px; what is 2.5 px off differs a little more than what is 2 px off."""
+    near = [shifted(2 * n, 96, 160) for n in (-1, 0, 1)]
+    one, other = found(4, 1.0, 96, 160), found(4.5, 0.5, 96, 160)
+    motion, depth = better(near, one, other, margin)
+    inner = np.s_[24:-24, 24:-24]
+    assert (motion[inner][..., 2] == (4.5 if is_taken else 4)).all()
+    assert (depth[inner] == (0.5 if is_taken else 1)).all()
+
+
+def test_a_source_that_is_clearly_better_in_the_picture_is_taken_throughout():
+    """All but the left sixth moves by 6 px, as the one source says; there, the other is right."""
+    near = [shifted(6 * n, 96, 300) for n in (-1, 0, 1)]
+    for n in (-1, 0, 1):
+        near[n + 1][:, :50] = shifted(2 * n, 96, 300)[:, :50]
+    motion, depth = better(near, found(2, 1.0, 96, 300), found(6, 0.5, 96, 300))
+    assert (motion[..., 2] == 6).all() and (depth == 0.5).all()
+    motion, _ = better(near, found(6, 0.5, 96, 300), found(2, 1.0, 96, 300))
+    assert (motion[8:-8, :20, 2] == 2).all() and (motion[8:-8, 90:, 2] == 6).all()
+
+
 def test_without_depth_there_is_none():
     near = [shifted(2 * n, 64, 96) for n in (-1, 0, 1)]
     one, other = found(2, 1.0, 64, 96), found(6, 0.5, 64, 96)
@@ -69,6 +91,9 @@ def test_what_dense_inverse_search_loses_comes_from_the_search():
     moved = np.abs(other[0][..., 2] - 44) < 1
     assert moved.sum() > 100 and is_searched[moved].mean() > 0.8
     assert (np.abs(one[0][..., 2] - 44) < 1)[moved].mean() < 0.5
+    alone = BetterMatch(quick, search).shot(pictures.get)(2)
+    np.testing.assert_array_equal(alone[0], motion)
+    np.testing.assert_array_equal(alone[1], depth)
     assert BetterMatch(quick, search).shot(both)(9) is None
 
 

@@ -29,6 +29,23 @@ def test_a_shifted_picture_gives_its_shift(quality):
     assert depth.shape == (96, 128) and depth.min() > 0.9
 
 
+@pytest.mark.parametrize("width, side", [(240, 12), (640, 24)])
+def test_small_things_before_a_still_ground_move_in_small_pictures(width, side):
+    """Ending at a quarter of the size, less than a third of their motion was found."""
+    y, x = np.mgrid[:120, :width].astype(np.float32)
+    ground = make.texture(x / 3, y / 3)
+    thing = make.texture(x[:side, :side] / 3, y[:side, :side] / 3, 4.0)
+
+    def shown(number):
+        picture, left = ground.copy(), width // 2 + 3 * number
+        picture[48 : 48 + side, left : left + side] = thing
+        return picture
+
+    motion, _ = Dis().shot({n: shown(n) for n in (-1, 0, 1)}.get)(0)
+    inner = motion[50 : 46 + side, width // 2 + 2 : width // 2 + side - 2].reshape(-1, 4)
+    np.testing.assert_allclose(np.median(inner, axis=0), [-3, 0, 3, 0], atol=0.5)
+
+
 def test_at_the_ends_of_a_shot_a_path_goes_straight_on():
     shot = Dis().shot({0: textured(0), 1: textured(1)}.get)
     for number in (0, 1):

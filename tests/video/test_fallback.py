@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 import make_frames as make
-from wgmb import Blur, gpu
+from wgmb import Blur, Flow, gpu
 from wgmb.run.pictures import PictureBlur, steady
 from wgmb.run.video import VideoRequest
 from wgmb.settings import BlurSettings
 from wgmb.settings.video import VideoSettings
 
 pytest.importorskip("cv2")
+
+from wgmb.flow.dis.better_match import BetterMatch
 
 COUNT = 11
 
@@ -89,3 +91,17 @@ def test_a_method_that_is_asked_for_blurs_searched_pictures_too(device, settings
     run = VideoRequest(blur=BlurSettings(**settings)).open(device)
     if run.fallback is not None:
         assert run.fallback[0] is run.blur
+
+
+@pytest.mark.parametrize("quality", ["best", "fast"])
+def test_without_a_gpu_the_best_search_takes_dense_inverse_search_where_that_matches_better(
+    device, quality, monkeypatch
+):
+    settings = VideoSettings(flow="search", flow_quality=quality)
+    is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+    motion, how = settings.source(device)
+    is_mixed = quality == "best" and is_slow
+    assert type(motion) is (BetterMatch if is_mixed else Flow)
+    assert ("dense inverse search" in how) == is_mixed
+    monkeypatch.setattr("wgmb.settings.video.is_installed", lambda package: False)
+    assert type(settings.source(device)[0]) is Flow and settings.source(device)[1] == "search"

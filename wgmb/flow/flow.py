@@ -22,7 +22,8 @@ class Flow:
 
     `quality`: "best", "fast", which ends at half the size, or "draft", which searches pictures of
     at most 440 px along the longer side. Without a GPU, "fast" searches those longer than 1280 px
-    at 960 px. `device`: your own wgpu device, the name of an adapter, or None for the best one.
+    at 960 px, unless it is to search the `whole`. `device`: your own wgpu device, the name of an
+    adapter, or None for the best one.
     """
 
     def __init__(
@@ -30,6 +31,7 @@ class Flow:
         *,
         quality: str = "best",
         device: wgpu.GPUDevice | str | None = None,
+        whole: bool = False,
     ):
         if quality not in EFFORTS:
             known = ", ".join(EFFORTS)
@@ -37,7 +39,7 @@ class Flow:
             raise InputError(f"no flow quality {quality!r}; available: {known}{hint}")
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        self._effort = (EFFORTS | IN_SOFTWARE if in_software else EFFORTS)[quality]
+        self._effort = (EFFORTS | IN_SOFTWARE if in_software and not whole else EFFORTS)[quality]
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on: one more for every level."""

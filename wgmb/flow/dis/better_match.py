@@ -14,6 +14,7 @@ from .inverse_search import Dis, Found
 LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match
 AROUND = 25  # px of these a side over which matches are averaged
+CLEARLY = 0.8  # of the one's mean difference in a picture: below it, the other is right throughout
 
 
 class Both(NamedTuple):
@@ -27,29 +28,36 @@ class Both(NamedTuple):
 class BetterMatch:
     """Motion and depth order from dense inverse search and from a search, whichever matches better.
 
-    A search that finds nothing leaves states without order, which are specks in a blurred picture;
-    there, dense inverse search is smooth.
+    `margin`: how many times the difference of dense inverse search that of the search may be. A
+    thorough dense inverse search makes it small also where it follows something else. A search that
+    finds nothing leaves states without order, which are specks in a blurred picture; there, dense
+    inverse search is smooth.
     """
 
-    def __init__(self, quick: Dis, search: Flow):
-        self._quick, self._search = quick, search
+    def __init__(self, quick: Dis, search: Flow, margin: float = 1.0):
+        self._quick, self._search, self._margin = quick, search, margin
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on."""
         return max(self._quick.reach(size), self._search.reach(size))
 
     def shot(
-        self, load: Callable[[int], Both | None], depth: bool = True
+        self, load: Callable[[int], Both | np.ndarray | None], depth: bool = True
     ) -> Callable[[int], Found | None]:
-        """Motion (height, width, 4) [px] and depth of a shot's pictures, which `load` gives."""
+        """Motion (height, width, 4) [px] and depth of a shot's pictures.
+
+        `load` gives them as Both, or (height, width, 3 or 4), linear.
+        """
 
         def grey(number: int) -> np.ndarray | None:
-            both = load(number)
-            return None if both is None else both.grey
+            picture = load(number)
+            if picture is None:
+                return None
+            return picture.grey if isinstance(picture, Both) else self._quick.grey(picture)
 
         def light(number: int) -> Any:
-            both = load(number)
-            return None if both is None else both.light()
+            picture = load(number)
+            return picture.light() if isinstance(picture, Both) else picture
 
         quick, search = self._quick.shot(grey, depth), self._search.shot(light)
 
@@ -58,15 +66,16 @@ class BetterMatch:
             if one is None or other is None:
                 return None
             near = [grey(n) for n in (number - 1, number, number + 1)]
-            return better(near, one, other)
+            return better(near, one, other, self._margin)
 
         return better_of
 
 
-def better(near: list[np.ndarray | None], one: Found, other: Found) -> Found:
-    """`other` where its match, averaged over some pixels, is better than that of `one`.
+def better(near: list[np.ndarray | None], one: Found, other: Found, margin: float = 1.0) -> Found:
+    """`other` where its match, averaged over some pixels, is up to `margin` times that of `one`.
 
-    `near`: a picture between its neighbours, of which one may lack, (height, width) uint8.
+    Where it is clearly better in the mean of the picture, `other` is taken throughout. `near`: a
+    picture between its neighbours, of which one may lack, (height, width) uint8.
     """
     cv2: Any = importlib.import_module("cv2")
     here = near[1]
@@ -78,7 +87,9 @@ def better(near: list[np.ndarray | None], one: Found, other: Found) -> Found:
     for motion, _ in (one, other):
         thin = motion[step // 2 :: step, step // 2 :: step] / np.float32(step)
         matches.append(_match(small, np.ascontiguousarray(thin)))
-    gain = cv2.blur(matches[0] - matches[1], (AROUND, AROUND))
+    if matches[1].mean() < CLEARLY * matches[0].mean():
+        return other[0], None if one[1] is None else other[1]
+    gain = cv2.blur(margin * matches[0] - matches[1], (AROUND, AROUND))
     takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
     rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
     takes = np.pad(takes, ((0, max(rows, 0)), (0, max(columns, 0))), mode="edge")

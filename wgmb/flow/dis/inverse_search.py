@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -21,6 +22,8 @@ from .consistency import REACH, SPACING, Consistency
 
 QUALITIES = ("fast", "best")
 _LEAST = 32  # pixels a side below which OpenCV fails; smaller pictures are continued
+_HALVINGS = 2  # of the size at which "fast" ends, and of that by which is told what is lost
+_ENDS_AT = 300  # px of the longer side below which "fast" does not end
 _APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
 Load = Callable[[int], np.ndarray | None]
 Found = tuple[np.ndarray, np.ndarray | None]
@@ -29,7 +32,8 @@ Found = tuple[np.ndarray, np.ndarray | None]
 class Dis:
     """Motion and depth order of pictures by dense inverse search, on the CPU.
 
-    `quality`: "fast", or "best", which ends at full size.
+    `quality`: "best" ends at full size; "fast" at a quarter of it, and pictures whose longer side
+    is below 1200 px at half of it, those below 600 px at full size.
     """
 
     def __init__(self, quality: str = "fast"):
@@ -39,11 +43,11 @@ class Dis:
             cv2: Any = importlib.import_module("cv2")
 
         self._cv2 = cv2
-        fast = quality == "fast"
-        preset = cv2.DISOPTICAL_FLOW_PRESET_FAST if fast else cv2.DISOPTICAL_FLOW_PRESET_MEDIUM
+        self._is_fast = quality == "fast"
+        preset = (
+            cv2.DISOPTICAL_FLOW_PRESET_FAST if self._is_fast else cv2.DISOPTICAL_FLOW_PRESET_MEDIUM
+        )
         self._flow: Any = cv2.DISOpticalFlow_create(preset)
-        if not fast:
-            self._flow.setFinestScale(0)
         self._shots: list[Consistency] = []
 
     def reach(self, size: tuple[int, int]) -> int:
@@ -82,13 +86,23 @@ class Dis:
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, depth: bool
     ) -> Found:
         """Motion and depth of a picture, from the grey of its neighbours, one of which is there."""
-        back = None if prev is None else self._way(here, prev)
-        ahead = None if next is None else self._way(here, next)
-        found = [way for way in (back, ahead) if way is not None]
-        back = -found[0] if back is None else back  # a path goes on as on its other side
-        ahead = -found[0] if ahead is None else ahead
-        motion = np.concatenate([back, ahead], axis=2)
-        return motion, functools.reduce(np.minimum, map(self._depth, found)) if depth else None
+        motion = self._motion(prev, here, next, self._finest(here.shape))
+        if not depth:
+            return motion, None
+        ways = [motion[..., 2 * k : 2 * k + 2] for k, p in enumerate((prev, next)) if p is not None]
+        return motion, functools.reduce(np.minimum, map(self._depth, ways))
+
+    def tells(
+        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, motion: np.ndarray
+    ) -> np.ndarray:
+        """The motion by which is told what is lost in a picture, whose own is `motion`.
+
+        Of "fast" that which ends at a quarter of the size, in small pictures, too: what a finer one
+        loses besides is small, and searches find little of it.
+        """
+        if not self._is_fast or self._finest(here.shape) == _HALVINGS:
+            return motion
+        return self._motion(prev, here, next, _HALVINGS)
 
     def change(self, prev: np.ndarray, here: np.ndarray, next: np.ndarray) -> np.ndarray:
         """By how much blocks of `SPACING` differ from both neighbours, 0 to 255."""
@@ -100,14 +114,33 @@ class Dis:
         )
         return np.minimum(prev, next)
 
-    def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def _motion(
+        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, finest: int
+    ) -> np.ndarray:
+        back = None if prev is None else self._way(here, prev, finest)
+        ahead = None if next is None else self._way(here, next, finest)
+        found = back if back is not None else ahead
+        assert found is not None
+        back = -found if back is None else back  # a path goes on as on its other side
+        ahead = -found if ahead is None else ahead
+        return np.concatenate([back, ahead], axis=2)
+
+    def _way(self, here: np.ndarray, other: np.ndarray, finest: int) -> np.ndarray:
         height, width = here.shape
+        self._flow.setFinestScale(finest)
         if min(here.shape) >= _LEAST:
             return self._flow.calc(here, other, None)
         more = 0, max(_LEAST - height, 0), 0, max(_LEAST - width, 0)  # above, below, left, right
         edge = self._cv2.BORDER_REPLICATE
         grown = (self._cv2.copyMakeBorder(p, *more, edge) for p in (here, other))
         return np.ascontiguousarray(self._flow.calc(*grown, None)[:height, :width])
+
+    def _finest(self, shape: tuple[int, ...]) -> int:
+        """The level at which the motion of a picture ends; each halves the size, 0 is full."""
+        if not self._is_fast:
+            return 0
+        halvings = int(math.log2(max(1.0, max(shape) / _ENDS_AT)))
+        return min(halvings, _HALVINGS)
 
     def _depth(self, way: np.ndarray) -> np.ndarray:
         """Depth by motion: pixels that do not move like most of the picture are nearer."""
@@ -175,5 +208,6 @@ class DisShot:
         change = None
         if prev is not None and next is not None:
             change = self._dis.change(prev, here, next)
-        self.consistency.add(number, motion[..., :2], motion[..., 2:], change)
+        told = self._dis.tells(prev, here, next, motion)
+        self.consistency.add(number, told[..., :2], told[..., 2:], change)
         return motion, order
