@@ -285,25 +285,29 @@ def test_trust_is_its_twin(stages, close):
 
 
 def test_what_is_extrapolated_is_its_twin(device, close):
-    """Half of the shadow is hidden in the next frame: only the previous one tells its motion."""
+    """Half of the shadow is hidden in the next frame: the previous one and the body tell of it."""
     stages = Stages(device, False, behind_a_body(0).between(behind_a_body(-1), behind_a_body(1)))
+    own, frame = stages["values 0"][..., 3], stages.frames[0]
+    near = stages.tiles(4)
+    depth, motion = frame["depth"], frame["motion"].astype(float)
+    bodies = twin.bodies(depth, motion)
+    cells = near[::4, ::4]
+    close(stages["bodies"], np.where(cells[..., None], bodies, 0), 2e-3)
     flows = {side: stages[f"flow ahead {side}"] for side in (-1, 1)}
-    explained = {side: stages[f"explained {side}"][..., :3] for side in (-1, 1)}
-    taken = 0.0
+    explained = {side: stages[f"explained {side}"] for side in (-1, 1)}
     for side in (-1, 1):
-        seen = stages[f"changes {side}"][..., 3] > 0
-        own, other = stages["values 0"][..., 3], stages[f"values {side}"][..., 3]
-        back = stages[f"flow back {side}"][..., :2]
-        depth = stages.frames[0]["depth"]
-        want = twin.explained(flows[side][..., :2], back, own, other, flows[-side], depth, seen)
-        near = np.all(explained[side] == 0, axis=2)  # nothing is written far from changes
-        assert np.mean(np.abs(np.where(near[..., None], 0, want) - explained[side]) > 5e-3) < 0.01
-        got = stages[f"chosen {side}"]
-        want = twin.chosen(flows[side], flows[-side], explained[side], explained[-side])
-        differs = np.abs(np.where(got.any(axis=2)[..., None], want, 0) - got).max(axis=2)
-        assert np.mean(differs > 2e-2) < 0.01  # where rounding decides, which one is better
-        taken = max(taken, np.abs(got[..., :2] - flows[side][..., :2]).max())
-    assert taken > 3
+        seen, other = stages[f"changes {side}"][..., 3] > 0, stages[f"values {side}"][..., 3]
+        back, body = stages[f"flow back {side}"][..., :2], twin.body_at(bodies, side, SIZE)
+        want = twin.explained(
+            flows[side][..., :2], back, own, other, flows[-side], body, depth, seen
+        )
+        differs = np.abs(want - explained[side])[near[::2, ::2]]
+        assert np.mean(differs > 5e-3) < 0.03  # where rounding decides what is one surface
+        best = twin.chosen(flows[side], flows[-side], body, explained[side], explained[-side])
+        assert 0.02 < np.mean(best[..., 2] < 0) < 0.5
+        want = twin.settled(np.where(near[..., None], best, 0), own)
+        differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
+        assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
 
 
 def change_by_twin(stages, time):
@@ -311,7 +315,7 @@ def change_by_twin(stages, time):
     own, side, share = stages["values 0"], -1 if time < 0 else 1, abs(time)
     before, after = (stages[f"changes {i}"][..., :3] for i in (-1, 1))
     other = stages[f"values {side}"]
-    ahead = f"flow ahead {side}" if stages.pulled else f"chosen {side}"
+    ahead = f"flow ahead {side}" if stages.pulled else f"settled {side}"
     flows = [stages[ahead], stages[f"flow back {side}"]]
     trusts = [flow[..., 2] for flow in flows]
     if stages.pulled:
@@ -400,7 +404,7 @@ def test_a_shadow_is_followed_to_where_a_body_hides_it():
         )
         for s in ("off", "auto")
     )
-    assert on < 0.65 * off
+    assert on < 0.5 * off
 
 
 def test_one_neighbour_is_followed_on_its_side():

@@ -317,28 +317,66 @@ def filled(flow, trusted, own):
     return np.where(share[..., None] > 0.01, mean * (1 - keep) + flow * keep, flow)
 
 
-def explained(flow, back, own, other, flow_other, depth, seen):
-    """Differences with the flow, without, and with the other neighbour's turned round; half size.
+def bodies(depth, motion):
+    """The motion of the nearest body before cells of 4 x 4 pixels, relative to what is there."""
+    height, width = depth.shape
+    found = np.zeros((-(-height // 4), -(-width // 4), 4))
+    for j, i in np.ndindex(*found.shape[:2]):
+        y, x = min(4 * j + 2, height - 1), min(4 * i + 2, width - 1)
+        for ring in range(6):
+            least, reach = depth[y, x] / 1.02, 3 * 1.6**ring
+            for angle in 2 * np.pi * np.arange(12) / 12:
+                row = min(max(y + round(reach * np.sin(angle)), 0), height - 1)
+                column = min(max(x + round(reach * np.cos(angle)), 0), width - 1)
+                apart = motion[row, column] - motion[y, x]
+                moves = max(np.hypot(*apart[:2]), np.hypot(*apart[2:])) > 1
+                if moves and depth[row, column] < least:
+                    least, found[j, i] = depth[row, column], apart
+            if found[j, i].any():
+                break
+    return found
 
-    `flow_other`: with its trust. What a body hides in either frame differs from nothing.
+
+def body_at(found, side, size):
+    """That of a pixel's cell, to the neighbour on `side`; `size`: height, width."""
+    way = found[..., 2:] if side > 0 else found[..., :2]
+    return np.repeat(np.repeat(way, 4, 0), 4, 1)[: size[0], : size[1]]
+
+
+def differs_by(to, was, own, other, depth, seen, hidden):
+    """Differences of the frame from the neighbour at x + to, and of that from the frame at x + was.
+
+    Each is `hidden` where a body hides it. `seen`: where the neighbour shows the surface.
+    """
+    x, y = centres(own.shape)
+    there = sampled(other, x + to[..., 0], y + to[..., 1])
+    here = sampled(own, x + was[..., 0], y + was[..., 1])
+    landing = seen[nearest(x + to[..., 0], y + to[..., 1])]
+    is_there, is_here = on_one_surface(to, depth) & landing, on_one_surface(was, depth) & seen
+    return np.where(is_there, np.abs(there - own), hidden) + np.where(
+        is_here, np.abs(here - other), hidden
+    )
+
+
+def explained(flow, back, own, other, flow_other, body, depth, seen):
+    """Differences with the flow, without, with the other neighbour's and the body's; half size.
+
+    `flow_other`: with its trust.
     """
     x, y = centres(own.shape)
     ahead = sampled(other, x + flow[..., 0], y + flow[..., 1])
     behind = sampled(own, x + back[..., 0], y + back[..., 1])
     with_ = np.abs(ahead - own) + np.abs(behind - other)
-    way = flow_other[..., :2]
+    still = np.abs(other - own)
+    way, trusted = flow_other[..., :2], flow_other[..., 2]
     was = way
     for _ in range(2):
         was = way[nearest(x + was[..., 0], y + was[..., 1])]
-    hidden_there = ~on_one_surface(-way, depth) | ~seen[nearest(x - way[..., 0], y - way[..., 1])]
-    hidden_here = ~on_one_surface(was, depth) | ~seen
-    ahead = sampled(other, x - way[..., 0], y - way[..., 1])
-    behind = sampled(own, x + was[..., 0], y + was[..., 1])
-    turned = np.where(hidden_there, 0, np.abs(ahead - own))
-    turned = turned + np.where(hidden_here, 0, np.abs(behind - other))
-    trusted = flow_other[..., 2]
+    turned = differs_by(-way, was, own, other, depth, seen, 0)
     turned = with_ * (1 - trusted) + turned * trusted
-    return blurred(np.dstack([with_, 2 * np.abs(other - own), turned]), 4.0)
+    as_body = differs_by(body, -body, own, other, depth, seen, still)
+    as_body = np.where(body.any(axis=2), as_body, with_)
+    return blurred(np.dstack([with_, 2 * still, turned, as_body]), 4.0)
 
 
 def nearest(x, y):
@@ -348,21 +386,43 @@ def nearest(x, y):
     return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
 
 
-def chosen(flow, flow_other, around, around_other):
-    """The flow that explains more, its trust, and how much it explains; around: see explained."""
+def chosen(flow, flow_other, body, around, around_other):
+    """The flow that explains most, its trust, and how much it explains; around: see explained.
+
+    Trust is less than 0 where the flow is not searched.
+    """
 
     def share(found, still):
         return np.clip((0.85 - found / np.maximum(still, 1e-4)) / 0.25, 0, 1)
 
     around, around_other = (doubled(a, flow.shape[:2]) for a in (around, around_other))
-    explains = share(around[..., 0], around[..., 1])
-    other = share(around[..., 2], around[..., 1]) * share(
-        around_other[..., 0], around_other[..., 1]
+    with_, still, turned, as_body = np.moveaxis(around, 2, 0)
+    best = np.dstack([flow[..., :3], share(with_, still)])
+    least = with_
+    other = share(turned, still) * share(around_other[..., 0], around_other[..., 1])
+    better = (flow_other[..., 2] * other > best[..., 2] * best[..., 3]) & (turned < 0.75 * least)
+    best = np.where(better[..., None], np.dstack([-flow_other[..., :3], other]), best)
+    least = np.where(better, turned, least)
+    explains = share(as_body, still)
+    better = body.any(axis=2) & (explains > np.abs(best[..., 2]) * best[..., 3])
+    better &= as_body < 0.75 * least
+    minus = np.full(explains.shape, -1.0)
+    return np.where(better[..., None], np.dstack([body, minus, explains]), best)
+
+
+def settled(found, own):
+    """The same, with flow that is not searched in the place of what explains nothing around it."""
+    weight = np.maximum(-found[..., 2], 0) * found[..., 3] * np.minimum(own / 0.1, 1)
+    around = doubled(
+        blurred(np.dstack([found[..., :2] * weight[..., None], weight]), 5.0), own.shape
     )
-    better = flow_other[..., 2] * other > flow[..., 2] * explains
-    better &= around[..., 2] < 0.75 * around[..., 0]
-    turned = np.dstack([-flow_other[..., :2], flow_other[..., 2], other])
-    return np.where(better[..., None], turned, np.dstack([flow[..., :3], explains]))
+    trusted, explains, share = np.abs(found[..., 2]), found[..., 3], around[..., 2]
+    keep = (trusted * explains)[..., None]
+    flow = around[..., :2] / np.maximum(share, 1e-4)[..., None] * (1 - keep)
+    flow = flow + found[..., :2] * keep
+    trust = 1 - keep[..., 0] + trusted * keep[..., 0]
+    filled = np.dstack([flow, trust, np.maximum(explains, np.minimum(share / 0.05, 1))])
+    return np.where(share[..., None] > 0.01, filled, np.dstack([found[..., :2], trusted, explains]))
 
 
 def pushed(found, flow, trusted, along):

@@ -89,51 +89,65 @@ def flows(
 ) -> dict[int, LightFlow]:
     """Flow to each neighbour, by its offset; `pictures`: values and their pyramids, 0 of the frame.
 
-    `changed`: changes of light to each neighbour. `surfaces`: "depth" and "planes" of the frame
-    itself, over whose surfaces all move.
+    `changed`: changes of light to each neighbour. `surfaces`: "depth", "planes" and "motion" of the
+    frame itself, over whose surfaces all move.
     """
     searched = {side: _flow(stage, side, pictures[0], pictures[side], surfaces) for side in changed}
-    return (
-        searched
-        if stage.pulled
-        else _extrapolated(stage, searched, pictures, changed, surfaces["planes"])
-    )
+    if stage.pulled:
+        return searched
+    values = {side: view for side, (view, _) in pictures.items()}
+    ahead = _extrapolated(stage, searched, values, changed, surfaces)
+    return {side: LightFlow(ahead[side], way.back) for side, way in searched.items()}
 
 
 def _extrapolated(
     stage: Stage,
     searched: Mapping[int, LightFlow],
-    pictures: Mapping[int, tuple[View, list[Level]]],
+    values: Mapping[int, View],
     changed: Mapping[int, View],
-    planes: View,
-) -> dict[int, LightFlow]:
-    """The same, by that to the other neighbour where this explains more; with what it explains."""
-    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
-    nothing = LightFlow(none, none)
-    given: dict[int, dict[str, Any]] = {
-        side: {
-            "values": pictures[0][0], "values_there": pictures[side][0], "planes": planes,
-            "flow": way.ahead, "flow_back": way.back, "change": changed[side],
-            "flow_other": searched.get(-side, nothing).ahead,
-        }
-        for side, way in searched.items()
-    }  # fmt: skip
-    around: dict[int, View] = {}
+    surfaces: Mapping[str, View],
+) -> dict[int, View]:
+    """Flow to each neighbour, not as searched where the other one or a body explains more."""
+    none = stage.none("rgba16float")
+    bodies = stage.sparse("bodies", "rgba16float", grid_of_cells(stage.size))
+
+    def run(entry: str, side: int, **bindings: View) -> None:
+        way, other = searched[side], searched.get(-side)
+        given = {
+            "values": values[0], "values_there": values[side], "change": changed[side],
+            "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
+            "bodies": bodies, "around": wide, "around_other": wide,
+            "flow_out": stage.unused("rgba16float"), "bodies_out": stage.unused("rgba16float"),
+            "weighted": stage.unused("rgba32float"), **surfaces,
+        }  # fmt: skip
+        stage.run(
+            "extrapolate", entry, over="near", constants={"NEXT": side > 0}, **given | bindings
+        )
+
+    wide = stage.none("rgba32float")
+    run("find_bodies", next(iter(searched)), bodies=none, bodies_out=bodies)
+    around, result = {}, {}
+    weighted = stage.sparse("weighted", "rgba32float")
     for side in searched:
-        differences = stage.sparse("weighted", "rgba32float")
-        stage.run("extrapolate", "explain", over="near", differences=differences, around=wide,
-                  around_other=wide, flow_out=stage.unused("rgba16float"),
-                  **given[side])  # fmt: skip
+        run("explain", side, weighted=weighted)
         around[side] = stage.sparse(f"explained {side}", "rgba32float", half_size(stage.size))
-        blurred(stage, differences, GUARD, around[side])
-    result = {}
-    for side, way in searched.items():
-        chosen = stage.sparse(f"chosen {side}", "rgba16float")
-        stage.run("extrapolate", "choose", over="near", around=around[side],
-                  around_other=around.get(-side, wide), flow_out=chosen,
-                  differences=stage.unused("rgba32float"), **given[side])  # fmt: skip
-        result[side] = LightFlow(chosen, way.back)
+        blurred(stage, weighted, GUARD, around[side])
+    near = stage.sparse("around", "rgba32float", half_size(stage.size))
+    for side in searched:
+        chosen = stage.sparse("chosen", "rgba16float")
+        run("choose", side, around=around[side], around_other=around.get(-side, wide),
+            flow_out=chosen)  # fmt: skip
+        run("weigh", side, flow=chosen, weighted=weighted)
+        blurred(stage, weighted, SPREAD, near)
+        result[side] = stage.sparse(f"settled {side}", "rgba16float")
+        run("settle", side, flow=chosen, around=near, flow_out=result[side])
     return result
+
+
+def grid_of_cells(size: tuple[int, int]) -> tuple[int, int]:
+    """The cells of extrapolate.wgsl across and down."""
+    side = int(wgsl.load(f"{FOLDER}/extrapolate.wgsl").constant("CELL"))
+    return -(-size[0] // side), -(-size[1] // side)
 
 
 def _flow(
@@ -146,9 +160,10 @@ def _flow(
         False: _search(stage, "back", neighbour[1], here[1]),
     }
     given = {
-        ahead: {"values": own[0], "values_there": other[0], **surfaces}
+        ahead: {"values": own[0], "values_there": other[0], "depth": surfaces["depth"],
+                "planes": surfaces["planes"]}
         for ahead, own, other in ((True, here, neighbour), (False, neighbour, here))
-    }
+    }  # fmt: skip
     names = {True: f"ahead {side}", False: f"back {side}"}
     filled = {
         ahead: _filled(stage, names[ahead], raw[ahead], raw[not ahead], given[ahead])

@@ -144,7 +144,11 @@ class MovingLight:
         seen = {offset: (view, pyramid(stage, str(offset), view))
                 for offset, view in present.items()}  # fmt: skip
         depth = kind.frames[0].depth
-        surfaces = {"depth": depth, "planes": planes(stage, depth)}
+        surfaces = {
+            "depth": depth,
+            "planes": planes(stage, depth),
+            "motion": kind.frames[0].motion,
+        }
         found = flows(stage, seen, changed, surfaces)
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
