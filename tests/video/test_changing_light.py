@@ -70,7 +70,7 @@ def toward(here, other, x, y, way):
     height, width = here.shape[:2]
     to = x + way[0], y + way[1]
     if not (0 <= to[0] <= width - 1 and 0 <= to[1] <= height - 1):
-        return np.zeros(3)
+        return np.zeros(3), 1.0
     around = [(dx, dy) for dy in range(-2, 3) for dx in range(-2, 3)]
     own = np.array(
         [here[np.clip(y + dy, 0, height - 1), np.clip(x + dx, 0, width - 1)] for dx, dy in around]
@@ -81,8 +81,8 @@ def toward(here, other, x, y, way):
     unlike = max(a.var() - shared**2 / max(b.var(), 255.0**-2), 0)
     far = np.abs((found - own).mean(0)).mean()
     same = max(np.exp(-unlike / 0.0314**2 - (far / 0.235) ** 2), np.exp(-((far / 0.1) ** 2)))
-    same *= 1 - np.exp(-((far / 0.0157) ** 2))
-    return same * (between(other, *to) ** 2 - here[y, x] ** 2)
+    is_no_noise = 1 - np.exp(-((far / 0.0157) ** 2))
+    return is_no_noise * (between(other, *to) ** 2 - here[y, x] ** 2), same
 
 
 def held(holdout, x, y):
@@ -95,6 +95,7 @@ def held(holdout, x, y):
 def test_the_passes_are_their_twin(device, mixing):
     pictures = {k: gain * texture(1) for k, gain in enumerate((0.8, 1.0, 1.15))}
     pictures[2][:, 40:] = texture(2)[:, 40:]
+    pictures[0][:20, 50:] = 3 * texture(5)[:20, 50:]
     rng = np.random.default_rng(3)
     motion = rng.uniform(-9, 9, (HEIGHT, WIDTH, 4)).astype(np.float32)
     holdout = 0.8 * (rng.random(SIZE) < 0.01).astype(np.float32)
@@ -104,10 +105,13 @@ def test_the_passes_are_their_twin(device, mixing):
     changes = np.zeros((height, width, 3))
     for y, x in np.ndindex(height, width):
         px = min(STEP * y + STEP // 2, HEIGHT - 1), min(STEP * x + STEP // 2, WIDTH - 1)
+        ends = []
         for k, side in enumerate((0, 2)):
             way = motion[px][side : side + 2] / factors[k] / STEP
-            gained = toward(small[1], small[side], x, y, way)
-            changes[y, x] += (1 - held(holdout, x, y)) * shares[k] * gained
+            ends.append(toward(small[1], small[side], x, y, way))
+        lost = (1 - ends[0][1]) * (1 - ends[1][1])
+        for share, (gained, same) in zip(shares, ends, strict=True):
+            changes[y, x] += (1 - held(holdout, x, y)) * share * (same + lost) * gained
     expected = pictures[1].astype(np.float64)
     for y, x in np.ndindex(HEIGHT, WIDTH):
         at = (np.array([x, y]) + 0.5) / STEP - 0.5
@@ -157,8 +161,20 @@ def test_what_is_no_change_of_light_leaves_the_picture(device, other):
     }[other]
     if other == "another place":
         motion[..., :] = 500.0
-    got = changed(device, {0: there, 1: here, 2: there}, motion, (0.0625, 0.0625))
+    after = here if other == "something else" else there
+    got = changed(device, {0: there, 1: here, 2: after}, motion, (0.0625, 0.0625))
     assert np.abs(got - here).mean() < 0.15 * 0.125 * np.abs(there - here).mean()
+
+
+def test_what_neither_neighbour_shows_fades(device):
+    """It is not there all the time, wherever it moves."""
+    motion = np.zeros((HEIGHT, WIDTH, 4), np.float32)
+    here, there = texture(1), texture(5) * 3
+    got = changed(device, {0: there, 1: here, 2: there}, motion, (0.0625, 0.0625))
+    fade = 0.125 * (there - here)
+    assert ((got - here) * fade).sum() / (fade * fade).sum() > 0.5
+    one = changed(device, {0: there, 1: here}, motion, (0.0625, 0.0625))
+    assert np.abs(one - here).mean() < 0.15 * np.abs(got - here).mean()
 
 
 def test_what_is_held_out_keeps_its_light(device):

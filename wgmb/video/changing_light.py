@@ -54,7 +54,7 @@ class ChangingLight:
 
     A moment between two pictures has light of both, by its distance in time. A blur takes the light
     of a picture itself; this adds the rest where the same is seen along the motion, in a light that
-    differs visibly.
+    differs visibly, and where neither neighbour shows the same, as it is not there all the time.
     """
 
     def __init__(self, device: wgpu.GPUDevice):
@@ -82,35 +82,37 @@ class ChangingLight:
         none = self._images.view("none", (1, 1), "r32float")
         sums = self._sums.at_least(_TEXEL * size[0] * size[1])
         here = self._reduced(encoder, surroundings.indices[1], picture)
+        if not (any(shares) or begins):
+            return
         texels = {"here": self._texel, "Output": self._texel}
         kernel = gpu.kernel(self._device, f"{_FOLDER}/change.wgsl", texels, STEP=step)
-        for side, index in enumerate(surroundings.indices[::2]):
-            if index is None or not (shares[side] or begins):
-                continue
-            ways = np.eye(4)[2 * side : 2 * side + 2] / surroundings.factors[side]
-            light = gpu.uniform(
-                self._device,
-                f"{_FOLDER}/change.wgsl",
-                "Light",
-                across=ways[0],
-                down=ways[1],
-                share=part * shares[side],
-                begins=begins,
-            )
-            kernel.run(
-                encoder,
-                "main",
-                gpu.FrameBindings.of_size(self._device, size),
-                light=light,
-                here=here,
-                other=self._reduced(encoder, index, picture),
-                linear=self._linear,
-                motion=surroundings.motion,
-                holdout=surroundings.holdout or none,
-                sums={"buffer": sums, "offset": 0, "size": sums.size},
-                changes=self._images.view("changes", size, self._texel),
-            )
-            begins = False
+        previous, next = (
+            here if index is None else self._reduced(encoder, index, picture)
+            for index in surroundings.indices[::2]
+        )
+        light = gpu.uniform(
+            self._device,
+            f"{_FOLDER}/change.wgsl",
+            "Light",
+            factors=surroundings.factors,
+            shares=part * np.array(shares),
+            exist=[index is not None for index in surroundings.indices[::2]],
+            begins=begins,
+        )
+        kernel.run(
+            encoder,
+            "main",
+            gpu.FrameBindings.of_size(self._device, size),
+            light=light,
+            here=here,
+            previous=previous,
+            next=next,
+            linear=self._linear,
+            motion=surroundings.motion,
+            holdout=surroundings.holdout or none,
+            sums={"buffer": sums, "offset": 0, "size": sums.size},
+            changes=self._images.view("changes", size, self._texel),
+        )
 
     def changes(self, size: Sequence[int]) -> LightChanges:
         """Those of all parts so far, of pictures of this size."""

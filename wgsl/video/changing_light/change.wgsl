@@ -1,25 +1,28 @@
 // What the light of a picture differs from its mean over the exposure, where the same is seen in another light before
-// or after it. Between two pictures, light is taken to change evenly.
+// or after it, or where neither shows it. Between two pictures, light is taken to change evenly.
 //#include common/frame.wgsl
 
 struct Light {
-    across: vec4f,      // from the motion to the way to the other picture
-    down: vec4f,
-    share: f32,         // of its light in the exposure
+    factors: vec2f,     // from the ways to the previous and the next picture to those in `motion`
+    shares: vec2f,      // of their light in the exposure
+    exist: vec2u,       // 1: there is such a picture
     begins: u32,        // 1: the first change of the exposure
 }
 
 @group(1) @binding(0) var<uniform> light: Light;
 @group(1) @binding(1) var here: texture_2d<f32>;        // stored as rgba32float, as reduce.wgsl leaves them
-@group(1) @binding(2) var other: texture_2d<f32>;       // the previous picture or the next one
-@group(1) @binding(3) var linear: sampler;
-@group(1) @binding(4) var motion: texture_2d<f32>;      // to_prev, to_next [px]
-@group(1) @binding(5) var holdout: texture_2d<f32>;     // 1 stays as it is; of one pixel, 0, where nothing does
-@group(1) @binding(6) var<storage, read_write> sums: array<vec4f>;      // of the changes so far, linear
-@group(1) @binding(7) var changes: Output;              // the same, for changed.wgsl
+@group(1) @binding(2) var previous: texture_2d<f32>;
+@group(1) @binding(3) var next: texture_2d<f32>;
+@group(1) @binding(4) var linear: sampler;
+@group(1) @binding(5) var motion: texture_2d<f32>;      // to_prev, to_next [px]
+@group(1) @binding(6) var holdout: texture_2d<f32>;     // 1 stays as it is; of one pixel, 0, where nothing does
+@group(1) @binding(7) var<storage, read_write> sums: array<vec4f>;      // of the changes so far, linear
+@group(1) @binding(8) var changes: Output;              // the same, for changed.wgsl
 
 override STEP: u32 = 4u;
 
+const PREVIOUS: u32 = 0u;
+const NEXT: u32 = 1u;
 const SIDE: i32 = 5;            // of a patch [small px]
 const RADIUS: i32 = 2;
 const UNLIKE: f32 = 0.0314;     // deviation that another brightness and contrast do not explain: something else
@@ -32,11 +35,16 @@ const LEAST: f32 = 1.5e-5;      // variance
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = min(STEP * id.xy + STEP / 2u, textureDimensions(motion) - 1u);
-    let ways = textureLoad(motion, px, 0);
-    let way = vec2f(dot(light.across, ways), dot(light.down, ways)) / f32(STEP);
+    let ways = textureLoad(motion, px, 0) / light.factors.xxyy / f32(STEP);
     let index = id.y * frame.size.x + id.x;
+    var back = vec4f(0.0, 0.0, 0.0, 1.0);
+    var ahead = back;
+    if light.exist.x == 1u { back = toward(PREVIOUS, vec2i(id.xy), ways.xy); }
+    if light.exist.y == 1u { ahead = toward(NEXT, vec2i(id.xy), ways.zw); }
+    let lost = (1.0 - back.w) * (1.0 - ahead.w);        // what neither shows is not there all the time
+    let change = light.shares.x * (back.w + lost) * back.xyz + light.shares.y * (ahead.w + lost) * ahead.xyz;
     let before = select(sums[index].xyz, vec3f(0.0), light.begins == 1u);
-    let sum = vec4f(before + light.share * (1.0 - held(id.xy)) * along(vec2i(id.xy), way), 0.0);
+    let sum = vec4f(before + (1.0 - held(id.xy)) * change, 0.0);
     sums[index] = sum;
     textureStore(changes, id.xy, sum);
 }
@@ -56,11 +64,11 @@ fn held(small: vec2u) -> f32 {
     return most;
 }
 
-/// Difference of the light at the end of a way, as far as the same is seen there.
-fn along(px: vec2i, way: vec2f) -> vec3f {
+/// Difference of the light at the end of a way, none for noise, and how far the same is seen there (0 to 1).
+fn toward(other: u32, px: vec2i, way: vec2f) -> vec4f {
     let last = vec2i(frame.size) - 1;
     let to = vec2f(px) + way;
-    if any(to < vec2f(0.0)) || any(to > vec2f(last)) { return vec3f(0.0); }
+    if any(to < vec2f(0.0)) || any(to > vec2f(last)) { return vec4f(0.0, 0.0, 0.0, 1.0); }
     var apart = vec3f(0.0);
     var totals = vec2f(0.0);    // of grey, here and there
     var squares = vec3f(0.0);   // of grey here, there, and their product
@@ -68,7 +76,7 @@ fn along(px: vec2i, way: vec2f) -> vec3f {
         let by = vec2i(k % SIDE, k / SIDE) - RADIUS;
         let at = clamp(px + by, vec2i(0), last);
         let own = textureLoad(here, at, 0).rgb;
-        let found = between(to + vec2f(by));
+        let found = between(other, to + vec2f(by));
         let greys = vec2f(dot(own, vec3f(1.0 / 3.0)), dot(found, vec3f(1.0 / 3.0)));
         apart += found - own;
         totals += greys;
@@ -81,13 +89,15 @@ fn along(px: vec2i, way: vec2f) -> vec3f {
     let unlike = max(spread.x - both * both / max(spread.y, LEAST), 0.0);
     let far = dot(abs(apart), vec3f(1.0 / 3.0)) / count;
     let lit = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR));
-    let same = max(lit, exp(-far * far / (NEAR * NEAR))) * (1.0 - exp(-far * far / (NOISE * NOISE)));
+    let same = max(lit, exp(-far * far / (NEAR * NEAR)));
     let own = textureLoad(here, px, 0).rgb;
-    let found = between(to);
-    return same * (found * found - own * own);
+    let found = between(other, to);
+    return vec4f((1.0 - exp(-far * far / (NOISE * NOISE))) * (found * found - own * own), same);
 }
 
-/// The other picture between its pixels, whose centres are whole numbers.
-fn between(at: vec2f) -> vec3f {
-    return textureSampleLevel(other, linear, (at + 0.5) / vec2f(frame.size), 0.0).rgb;
+/// Another picture between its pixels, whose centres are whole numbers.
+fn between(other: u32, at: vec2f) -> vec3f {
+    let place = (at + 0.5) / vec2f(frame.size);
+    if other == NEXT { return textureSampleLevel(next, linear, place, 0.0).rgb; }
+    return textureSampleLevel(previous, linear, place, 0.0).rgb;
 }
