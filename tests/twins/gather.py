@@ -75,9 +75,9 @@ def gather(frames, times):
         for x in range(width):
             here = [t[y // TILE][x // TILE] for t in tiles]
             if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
-                sharpness = sharpness_of(layers, here, span, len(times))
+                edge = width_of(layers, here, span, len(times))
                 seen = [
-                    instant(layers, here, (x, y), t, own, (n, len(times)), sharpness)
+                    instant(layers, here, (x, y), t, own, (n, len(times)), edge)
                     for n, t in enumerate(times)
                 ]
                 if any(one is None for one in seen):
@@ -114,7 +114,7 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
             apart = np.sqrt(max(np.sum((motion[p] - motion[y, x]) ** 2) for p in near))
             beyond = (1.05**2 - 1) * min(1, max(0.1, 4 / max(apart, 1e-6)))
             edges[y, x] = apart > 0.5 and max(depths) > (1 + beyond) * min(depths)
-            edges[y, x] &= apart * longest >= 0.6 or not is_ramp(motion, (y, x))
+            edges[y, x] &= apart * longest >= 0.85 or not is_ramp(motion, (y, x))
             k = 1.05**2
             shows_third[y, x] = edges[y, x] and any(
                 min(depths) * k < d < max(depths) / k for d in depths
@@ -539,7 +539,7 @@ def scatter(frame, tiles, span, slices, own):
 # ---- search ---------------------------------------------------------------------------------
 
 
-def instant(layers, tiles, pixel, t, color, sample, sharpness):
+def instant(layers, tiles, pixel, t, color, sample, edge):
     """The samples at the pixel at time `t`: edge, the edge behind it, the opaque one.
 
     `sample`: its number, and how many there are. None: something that all frames hide.
@@ -556,7 +556,7 @@ def instant(layers, tiles, pixel, t, color, sample, sharpness):
         shown.append(opaque)
     clear, sum_ = 1.0, 0.0
     for s in shown:
-        got, cover = fetch(layers[s.frame], s, sharpness)
+        got, cover = fetch(layers[s.frame], s, edge)
         sum_ = sum_ + clear * got
         clear *= 1 - cover
     if clear < 0.5:
@@ -736,14 +736,14 @@ def is_before(edge, opaque):
     return edge.depth < opaque.depth / (1.0 if apart else 1.05)
 
 
-def sharpness_of(layers, tiles, span, samples):
-    """The sharpness of edges, 0 where something moves over 2 px from sample to sample."""
+def width_of(layers, tiles, span, samples):
+    """The width of edges between two texels: half the motion from sample to sample."""
     near = [f for f, layer in enumerate(layers) if abs(layer.offset) <= 1]
     lengths = [tiles[f]["longest"] / max(abs(t - layers[f].offset) for t in span) for f in near]
-    return np.clip(2 - (span[1] - span[0]) * max(lengths) / samples, 0, 1)
+    return np.clip(0.5 * (span[1] - span[0]) * max(lengths) / samples, 0.667, 1)
 
 
-def fetch(frame, s, sharpness):
+def fetch(frame, s, edge):
     """Colour and coverage of a sample, from the texels of its own surface."""
     if not s.back and frame.edgeless[s.pixel]:
         if frame.offset == 0 and frame.smooth[s.pixel]:
@@ -756,7 +756,7 @@ def fetch(frame, s, sharpness):
         for di in (0, 1):
             i, j = corner[0] + di, corner[1] + dj
             line = 1 - np.abs(s.at - 0.5 - (i, j))
-            share = np.prod(line + sharpness * (line**2 * (3 - 2 * line) - line))
+            share = np.prod(np.clip((line - 0.5) / edge + 0.5, 0, 1))
             p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
             if s.back and behind:

@@ -20,7 +20,7 @@ const FAST: f32 = 2.0;          // difference of the motions at an edge that tel
 const MIXED: f32 = 0.2;         // where they differ by more than this share of it on the same side of the edge
 const SLOW_MOTION: f32 = 1.0;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px];
 const WIDE_MOTION: f32 = 8.0;   // the same of a wide front's own pixels, as a rule: beside it, the 5 x 5 show less of it;
-const RAMP_MOTION: f32 = 0.6;   // the same of what is no edge if motions change as much around it:
+const RAMP_MOTION: f32 = 0.85;   // the same of what is no edge if motions change as much around it:
 const RAMP_SHARE: f32 = 0.6;    // by more than this share
 const WHOLE_SQUARES: u32 = 0x1ce7u; // of the 5 x 5 bits, the first three of the first three rows: 3 x 3 that begin there end within
 

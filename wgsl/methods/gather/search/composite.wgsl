@@ -13,8 +13,8 @@ override WEIGHTED: bool = false;    // pixels have weights
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
 const TEXEL_DEPTH_RATIO: f32 = 1.25;   // of a texel of a surface to its sample: at outlines, round bodies fall away steeply
-const SHARP_STEP: f32 = 1.0;        // edges are sharp up to this motion from sample to sample [px],
-const SOFT_STEP: f32 = 2.0;         // and bilinear from here on
+const EDGE_WIDTH: f32 = 0.5;            // of edges between two texels, as a share of the motion from sample to sample,
+const LEAST_WIDTH: f32 = 0.667;         // and at least [px]; at 1, they are bilinear
 
 /// The matte of a pixel of frame `f`.
 fn matte_at(px: vec2u, f: u32) -> Matte {
@@ -40,7 +40,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
 }
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
-fn composite_front_to_back(visible: Visible, t: f32, duration: f32, sharpness: f32) -> Composite {
+fn composite_front_to_back(visible: Visible, t: f32, duration: f32, width: f32) -> Composite {
     let front_edge = is_before(visible.front_edge, visible.opaque);
     let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
         && is_behind(visible.back_edge, visible.front_edge);
@@ -59,7 +59,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, sharpness: f
         var one = Composite();
         var i = 0u;
         loop {
-            if n < parts { add_texel(&one, part, i, sharpness); }
+            if n < parts { add_texel(&one, part, i, width); }
             i++;
             if n >= parts || i >= 4u { break; }
         }
@@ -95,19 +95,19 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, sharpness: f
     return sum;
 }
 
-/// The sharpness of edges, 0 to 1, by the longest step from sample to sample [px].
-fn sharpness_of(step: f32) -> f32 {
-    return clamp((SOFT_STEP - step) / (SOFT_STEP - SHARP_STEP), 0.0, 1.0);
+/// The width of edges between two texels, up to 1, by the longest step from sample to sample [px].
+fn width_of(step: f32) -> f32 {
+    return clamp(EDGE_WIDTH * step, LEAST_WIDTH, 1.0);
 }
 
 /// Add texel `i` of the four around a sample, if it is of the same surface. Bilinear weights hide the gaps between long steps,
-/// but blur as much as a motion of 1.4 px. With sharpness, the nearer texel counts for more.
-fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, sharpness: f32) {
+/// but blur as much as a motion of 1.4 px. Where edges are narrower, the nearer texel counts for more.
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, width: f32) {
     let front = sample.layer / 2u * 2u;
     let is_back = sample.layer % 2u == 1u;
     let corner = floor(sample.at - 0.5);
     let bilinear = sample.at - 0.5 - corner;
-    let share = mix(bilinear, smoothstep(vec2f(0.0), vec2f(1.0), bilinear), sharpness);
+    let share = clamp((bilinear - 0.5) / width + 0.5, vec2f(0.0), vec2f(1.0));
     let step = vec2f(vec2u(i & 1u, i >> 1u));
     let px = nearest_pixel(corner + step);
     let shares = mix(1.0 - share, share, step);

@@ -32,7 +32,7 @@ struct Pixel {          // what all times of a pixel have in common
     c: Candidates,
     trajectory: Trajectory5,    // its own
     times: SampleTimes,
-    sharpness: f32,     // of edges, see add_texel()
+    width: f32,         // of edges between two texels, see add_texel()
     share: f32,         // of a time, applied before adding, so that no sum of finite colours overflows
 }
 
@@ -98,8 +98,8 @@ fn pixel_at(id: vec2u) -> Pixel {
     let shift = frame.jitter * (pixel_noise(id) - 0.5);
     let times = sample_times(x, shift, a, b, c);
     let share = 1.0 / f32(times.count);
-    let sharpness = sharpness_of(share * longest_blur(a, b, c));
-    return Pixel(x, id / BLOCK, a, b, c, unpack_trajectory(surface_of(vec2i(id), 0u)), times, sharpness, share);
+    let width = width_of(share * longest_blur(a, b, c));
+    return Pixel(x, id / BLOCK, a, b, c, unpack_trajectory(surface_of(vec2i(id), 0u)), times, width, share);
 }
 
 /// True if nothing moves, nor does anything come here.
@@ -154,7 +154,7 @@ fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, st
             let t = time_in(pixel.times, times.first, todo);
             let visible = resolve_visibility(pixel.x, starts, t, pixel.a, pixel.b, pixel.c);
             let duration = duration_in(pixel.times, times.first, todo);
-            let result = composite_front_to_back(visible, t, duration, pixel.sharpness);
+            let result = composite_front_to_back(visible, t, duration, pixel.width);
             let is_covered = result.coverage > 0.5;
             if is_covered {
                 add_time(exposure, result, pixel.share / result.coverage);
