@@ -305,9 +305,15 @@ def test_what_is_extrapolated_is_its_twin(device, close):
         assert np.mean(differs > 5e-3) < 0.03  # where rounding decides what is one surface
         best = twin.chosen(flows[side], flows[-side], body, explained[side], explained[-side])
         assert 0.02 < np.mean(best[..., 2] < 0) < 0.5
+        assert (stages[f"settled {side}"][..., 3] < 0).any()
         want = twin.settled(np.where(near[..., None], best, 0), own)
         differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
         assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
+    for i, time in enumerate(stages.times):
+        change, _ = change_by_twin(stages, time)
+        want = twin.added(change, frame["light"], stages.albedo)
+        differs = np.abs(want - stages.layer(i)[..., :3]).max(axis=2)[stages.tiles(2)]
+        assert np.mean(differs > 2e-2) < 0.01 < np.mean(np.abs(want).max(axis=2) > 2e-2)
 
 
 def change_by_twin(stages, time):

@@ -411,7 +411,10 @@ def chosen(flow, flow_other, body, around, around_other):
 
 
 def settled(found, own):
-    """The same, with flow that is not searched in the place of what explains nothing around it."""
+    """The same, with flow that is not searched in the place of what explains nothing around it.
+
+    How much it explains is less than 0 there.
+    """
     weight = np.maximum(-found[..., 2], 0) * found[..., 3] * np.minimum(own / 0.1, 1)
     around = doubled(
         blurred(np.dstack([found[..., :2] * weight[..., None], weight]), 5.0), own.shape
@@ -422,7 +425,10 @@ def settled(found, own):
     flow = flow + found[..., :2] * keep
     trust = 1 - keep[..., 0] + trusted * keep[..., 0]
     filled = np.dstack([flow, trust, np.maximum(explains, np.minimum(share / 0.05, 1))])
-    return np.where(share[..., None] > 0.01, filled, np.dstack([found[..., :2], trusted, explains]))
+    own = np.dstack([found[..., :2], trusted, explains])
+    result = np.where(share[..., None] > 0.01, filled, own)
+    result[..., 3] *= np.where((found[..., 2] >= 0) & (share <= 0.05), 1, -1)
+    return result
 
 
 def pushed(found, flow, trusted, along):
@@ -453,12 +459,16 @@ def smooth(x, half):
 def from_pushed(a, b, own, other, trusts, explains, time):
     """The change of the logarithm of light, from what came from here (a) and from there (b).
 
-    `explains`: how much the flow explains.
+    `explains`: how much the flow explains, less than 0 where it is not searched: there what covers
+    a part of a pixel is spread over up to twice this part.
 
     Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
     """
     amounts = own[..., 3], other[..., 3]
     own, other = own[..., :3], other[..., :3]
+    most = np.where(explains < 0, 2, 1)[..., None]
+    a, b = (one * np.clip(1 / np.maximum(one[..., 3:], 0.01), 1, most) for one in (a, b))
+    explains = np.abs(explains)
     late = smooth(time, 0.3)
     n = (1 - late) * np.minimum(a[..., 3], 1) + late * np.minimum(b[..., 3], 1)
     mean = sum(

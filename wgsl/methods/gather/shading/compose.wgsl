@@ -31,6 +31,7 @@ override ONTO: bool = false;        // add to `earlier`
 override TOLD: bool = true;         // how sure it is
 
 const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
+const MOST_CLOSED: f32 = 2.0;       // factor of what covers a part of a pixel where flow is not searched
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
 const MOST_ADDED: f32 = 60000.0;    // [linear]
 const COUNTS: f32 = 0.1;            // change of the logarithm of light from which on it has to be followed
@@ -162,8 +163,10 @@ fn store(px: vec2i, change: vec3f, a: f32) {
 /// both frames' darkness here whose flow is trusted.
 fn pushed(px: vec2i) -> vec4f {
     let first = 2u * (u32(px.y) * frame.size.x + u32(px.x));
-    let a = unpack_pushed(from_here[first], from_here[first + 1u]);
-    let b = unpack_pushed(from_there[first], from_there[first + 1u]);
+    let explains = textureLoad(flow, px, 0).w;
+    let most = select(1.0, MOST_CLOSED, explains < 0.0);
+    let a = closed(unpack_pushed(from_here[first], from_here[first + 1u]), most);
+    let b = closed(unpack_pushed(from_there[first], from_there[first + 1u]), most);
     for (var k = 0u; k < 2u; k++) {     // empty for the next time
         from_here[first + k] = 0u;
         from_there[first + k] = 0u;
@@ -181,7 +184,13 @@ fn pushed(px: vec2i) -> vec4f {
     let rests = (1.0 - late) * (1.0 - trusts.x) * own + late * (1.0 - trusts.y) * other;
     let change = log(max(1.0 - mixed - rests, vec3f(LEAST_LIGHT))) - log(max(1.0 - own, vec3f(LEAST_LIGHT)));
     let trusted = dot(trusts, vec2f(value.a, value_there.a)) / max(value.a + value_there.a, 1e-3);
-    return textureLoad(flow, px, 0).w * vec4f(change, trusted);
+    return abs(explains) * vec4f(change, trusted);
+}
+
+/// Darkness that covers a part of a pixel spread over up to `most` times this part: flow that is not searched parts from place to
+/// place, and would leave gaps.
+fn closed(pushed: vec4f, most: f32) -> vec4f {
+    return pushed * clamp(1.0 / max(pushed.w, 0.01), 1.0, most);
 }
 
 /// The light that has come here by then along both flows; as a change of its logarithm. a: how far it is trusted.

@@ -12,7 +12,7 @@
 @group(1) @binding(2) var bodies: texture_2d<f32>;          // stored as rgba16float, by `find_bodies`
 @group(1) @binding(3) var around: texture_2d<f32>;          // stored as rgba32float: `differences` or `weighted`, blurred, at half the size
 @group(1) @binding(4) var around_other: texture_2d<f32>;    // stored as rgba32float: differences from the other neighbour
-@group(1) @binding(5) var flow_out: Flow;                   // flow [px], trust, how much it explains, both 0..1; of `choose`: trust less than 0 where it is not searched
+@group(1) @binding(5) var flow_out: Flow;                   // flow [px], trust, how much it explains, both 0..1; of `choose` trust, of `settle` the last less than 0 where it is not searched
 @group(1) @binding(11) var weighted: Weighted;              // of `explain`: differences with flow, without, with the other's, with the body's; of `weigh`: flow times weight, weight
 @group(1) @binding(12) var depth: texture_2d<f32>;          // stored as given
 @group(1) @binding(13) var motion: texture_2d<f32>;         // stored as given: to_prev, to_next [px]
@@ -168,5 +168,7 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
                      textureLoad(around, s.pair.xw, 0), textureLoad(around, s.pair.zw, 0));
     let keep = own.z * own.w;
     let filled = vec4f(mix(near.xy / max(near.z, 1e-4), own.xy, keep), mix(1.0, own.z, keep), max(own.w, min(near.z / ENOUGH, 1.0)));
-    textureStore(flow_out, id, select(own, filled, near.z > 0.2 * ENOUGH));
+    let result = select(own, filled, near.z > 0.2 * ENOUGH);
+    let is_searched = chosen.z >= 0.0 && near.z <= ENOUGH;
+    textureStore(flow_out, id, vec4f(result.xyz, select(-result.w, result.w, is_searched)));
 }

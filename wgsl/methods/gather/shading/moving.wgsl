@@ -3,7 +3,7 @@
 
 @group(1) @binding(6) var values: texture_2d<f32>;      // stored as rgba16float, by values.wgsl
 @group(1) @binding(7) var values_there: texture_2d<f32>;    // stored as rgba16float
-@group(1) @binding(8) var flow: texture_2d<f32>;        // stored as rgba16float: to the other frame [px]; trust; what it explains
+@group(1) @binding(8) var flow: texture_2d<f32>;        // stored as rgba16float: to the other frame [px]; trust; see `settle` of extrapolate.wgsl
 @group(1) @binding(9) var flow_back: texture_2d<f32>;   // stored as rgba16float
 
 fn values_at(at: vec2f) -> vec4f {
