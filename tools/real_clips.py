@@ -53,13 +53,12 @@ CLIPS = {
     "bedroom": Clip("bedroom.mp4", 100, 4),
     "dog": Clip("01_dog.mp4", 100, 4),
     "bottles": Clip("bottle-detection.mp4", 203, 4, is_halved=False),
-    "beam": Clip("cam03.mp4", 48, 4, is_halved=False),
     "signs, unseen": Clip("walk.mkv", 40, 4),
     "blocks, unseen": Clip("03_blocks.mp4", 100, 4),
     "coffee, unseen": Clip("04_coffee.mp4", 100, 4),
     "two people, unseen": Clip("cam04.mp4", 48, 4),
 }
-"""`bottles`, `beam` and those that are called unseen were looked at only when all was done."""
+"""`bottles` and those that are called unseen were looked at only when all was done."""
 
 Pictures = dict[int, np.ndarray]
 """Linear pictures (height, width, 3) by number, 0 the one in the middle."""
