@@ -306,7 +306,7 @@ def test_what_is_extrapolated_is_its_twin(device, close):
         best = twin.chosen(flows[side], flows[-side], body, explained[side], explained[-side])
         assert 0.02 < np.mean(best[..., 2] < 0) < 0.5
         assert (stages[f"settled {side}"][..., 3] < 0).any()
-        want = twin.settled(np.where(near[..., None], best, 0), own)
+        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
         differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
         assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
     for i, time in enumerate(stages.times):

@@ -404,27 +404,33 @@ def chosen(flow, flow_other, body, around, around_other):
     best = np.where(better[..., None], np.dstack([-flow_other[..., :3], other]), best)
     least = np.where(better, turned, least)
     explains = share(as_body, still)
-    better = body.any(axis=2) & (explains > np.abs(best[..., 2]) * best[..., 3])
+    better = body.any(axis=2) & (explains > np.maximum(np.abs(best[..., 2]) * best[..., 3], 0.75))
     better &= as_body < 0.75 * least
     minus = np.full(explains.shape, -1.0)
     return np.where(better[..., None], np.dstack([body, minus, explains]), best)
 
 
-def settled(found, own):
+def settled(found, own, other, depth, seen):
     """The same, with flow that is not searched in the place of what explains nothing around it.
 
-    How much it explains is less than 0 there.
+    Where it leads has to look as what is there. How much it explains is less than 0 there.
     """
     weight = np.maximum(-found[..., 2], 0) * found[..., 3] * np.minimum(own / 0.1, 1)
     around = doubled(
         blurred(np.dstack([found[..., :2] * weight[..., None], weight]), 5.0), own.shape
     )
     trusted, explains, share = np.abs(found[..., 2]), found[..., 3], around[..., 2]
-    keep = (trusted * explains)[..., None]
-    flow = around[..., :2] / np.maximum(share, 1e-4)[..., None] * (1 - keep)
+    way = around[..., :2] / np.maximum(share, 1e-4)[..., None]
+    x, y = centres(own.shape)
+    x, y = x + way[..., 0], y + way[..., 1]
+    is_there = on_one_surface(way, depth) & seen[nearest(x, y)]
+    differs = np.abs(sampled(other, x, y) - own)
+    fits = np.where(is_there, 1 - np.minimum(differs / 0.3, 1), 1)
+    keep = np.maximum(trusted * explains, 1 - fits)[..., None]
+    flow = way * (1 - keep)
     flow = flow + found[..., :2] * keep
     trust = 1 - keep[..., 0] + trusted * keep[..., 0]
-    filled = np.dstack([flow, trust, np.maximum(explains, np.minimum(share / 0.05, 1))])
+    filled = np.dstack([flow, trust, np.maximum(explains, fits * np.minimum(share / 0.05, 1))])
     own = np.dstack([found[..., :2], trusted, explains])
     result = np.where(share[..., None] > 0.01, filled, own)
     result[..., 3] *= np.where((found[..., 2] >= 0) & (share <= 0.05), 1, -1)

@@ -28,6 +28,8 @@ const MISSED: f32 = 0.85;       // share of the differences without flow from wh
 const EXPLAINED: f32 = 0.6;     // and up to which it explains them
 const PRESENT: f32 = 0.1;       // value from which on there is something to move
 const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
+const SURE: f32 = 0.75;         // how much the motion of a body has to explain
+const UNLIKE: f32 = 0.3;       // difference of values from which on flow around does not fit
 const CELL: u32 = 4u;           // side [px]
 const RINGS: u32 = 6u;          // around a cell, in which bodies are looked for,
 const FIRST_RING: f32 = 3.0;    // [px]
@@ -135,7 +137,7 @@ fn choose(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     }
     let body = body_at(id);
     let body_explains = explained(differs.w, differs.y);
-    if any(body != vec2f(0.0)) && body_explains > abs(best.z) * best.w && differs.w < CLEARLY * least {
+    if any(body != vec2f(0.0)) && body_explains > max(abs(best.z) * best.w, SURE) && differs.w < CLEARLY * least {
         best = vec4f(body, -1.0, body_explains);
     }
     textureStore(flow_out, id, best);
@@ -156,7 +158,7 @@ fn weigh(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     textureStore(weighted, id, vec4f(weight * own.xy, weight, 0.0));
 }
 
-/// It takes the place of flow around it that explains nothing: within a shadow nothing differs.
+/// It takes the place of flow around it that explains nothing, within a shadow where nothing differs, if what is there fits.
 @compute @workgroup_size(WG_X, WG_Y)
 fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -166,8 +168,15 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let s = square_within(half_size(), 0.5 * (vec2f(id) + 0.5));
     let near = mixed(s, textureLoad(around, s.pair.xy, 0), textureLoad(around, s.pair.zy, 0),
                      textureLoad(around, s.pair.xw, 0), textureLoad(around, s.pair.zw, 0));
-    let keep = own.z * own.w;
-    let filled = vec4f(mix(near.xy / max(near.z, 1e-4), own.xy, keep), mix(1.0, own.z, keep), max(own.w, min(near.z / ENOUGH, 1.0)));
+    let way = near.xy / max(near.z, 1e-4);
+    let to = vec2f(id) + 0.5 + way;
+    let landing = inside(vec2i(floor(to)));
+    let is_there = is_one_surface(vec2i(id), landing) && textureLoad(change, landing, 0).a > 0.0;
+    let differs = abs(values_there_at(to).a - textureLoad(values, id, 0).a);
+    let fits = select(1.0, 1.0 - min(differs / UNLIKE, 1.0), is_there);
+    let keep = max(own.z * own.w, 1.0 - fits);
+    let explains = max(own.w, fits * min(near.z / ENOUGH, 1.0));
+    let filled = vec4f(mix(way, own.xy, keep), mix(1.0, own.z, keep), explains);
     let result = select(own, filled, near.z > 0.2 * ENOUGH);
     let is_searched = chosen.z >= 0.0 && near.z <= ENOUGH;
     textureStore(flow_out, id, vec4f(result.xyz, select(-result.w, result.w, is_searched)));
