@@ -309,7 +309,7 @@ def test_what_is_extrapolated_is_its_twin(device, close):
         want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
         differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
         assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
-    for i, time in enumerate(stages.times):
+    for i, time in list(enumerate(stages.times))[::3]:
         change, _ = change_by_twin(stages, time)
         want = twin.added(change, frame["light"], stages.albedo)
         differs = np.abs(want - stages.layer(i)[..., :3]).max(axis=2)[stages.tiles(2)]
