@@ -83,12 +83,13 @@ fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, 
                    is_next: bool) -> Acceleration {
     let at = vec2f(px) + 0.5 + step;
     let is_inside = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
+    let beside = select(vec2f(-1.0), vec2f(1.0), fract(at) >= vec2f(0.5));
     var result = Acceleration(vec2f(0.0), false, 1.0);
     var least = RETURNS * RETURNS;
     var i = 0;
     loop {
-        let corner = floor(at - 0.5) + vec2f(vec2i((i - 1) & 1, (i - 1) >> 1u));
-        let there = vec2i(clamp(select(corner, at, i == 0), vec2f(0.0), vec2f(frame.size) - 1.0));
+        let place = at + beside * vec2f(vec2i(i & 1, i >> 1u));
+        let there = vec2i(clamp(place, vec2f(0.0), vec2f(frame.size) - 1.0));
         let vectors = textureLoad(motion_there, there, 0);
         let given = textureLoad(depth_there, there, 0).x;
         let ratio = valid_depth(given) / z;
@@ -103,7 +104,7 @@ fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, 
             least = dot(off, off);
         }
         i++;
-        if i > 4 || (i == 1 && (is_known || !is_inside)) { break; }
+        if i > 3 || (i == 1 && (is_known || !is_inside)) { break; }
     }
     return result;
 }
