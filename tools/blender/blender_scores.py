@@ -168,10 +168,10 @@ HARD_NOTES = """
 * `shadows`, `shadows_pan`, `reflections`: with passes of light, `gather` follows the light that
   moves over the ground. At 360° it halves the FLIP of `shadows`, and gains 7 dB. The checkered box
   in the mirror of `reflections` moves by more than its own pattern and stays too sharp.
-* `slant`: no shadow moves, and the search for one costs nothing. In `car` it costs 0.0002 to
-  0.0003 FLIP, in `glass` at 180° 0.0003 (and gains 0.3 dB).
-* `--shading frames`, without the passes, gains most of this in `shadows`, and loses in
-  `reflections`, in `slant` and at 180° in `beginner`.
+* `slant`: no shadow moves, and the search for one costs nothing. In `car` it costs 0.0001 FLIP;
+  `glass` gains 0.0002 at 180° and 0.0018 at 360°.
+* `--shading frames`, without the passes, gains most of this in `shadows`, half of it in `beginner`,
+  and loses in `reflections` and in `slant`.
 * `beginner`: `gather` is ahead of all others. The passes gain 0.2 dB at 180° and cost 0.0003 FLIP,
   at 360° they gain 0.8 dB. What remains lies where a shadow touches its body.
 
