@@ -97,6 +97,75 @@ def test_what_dense_inverse_search_loses_comes_from_the_search():
     assert BetterMatch(quick, search).shot(both)(9) is None
 
 
+class Told:
+    """A source that knows the motion of pictures, and counts how often it is asked."""
+
+    def __init__(self, motions):
+        self.motions, self.asked = motions, []
+
+    def reach(self, size):
+        return 3
+
+    def change(self, *near):
+        return Dis().change(*near)
+
+    def shot(self, load, depth=True):
+        return lambda number: self.asked.append(number) or self.motions.get(number)
+
+
+COUNT, HEIGHT, WIDTH = 5, 96, 160
+
+
+def repeating():
+    """Pictures of waves that repeat after 24 px and move by 10; and two sources of their motion.
+
+    The quick one follows the repeat in every second picture; the other is 0.3 px off in all.
+    """
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+
+    def picture(n):
+        waves = np.sin((x - 10 * n) * np.pi / 12) * np.cos(y / 3)
+        return np.rint(128 + 90 * waves).astype(np.uint8)
+
+    pictures = {n: Both(picture(n), lambda: None) for n in range(COUNT)}
+    size = HEIGHT, WIDTH
+    quick = Told({n: found(10 if n % 2 else -14, 1.0, *size) for n in pictures})
+    return pictures, quick, Told({n: found(10.3, 0.5, *size) for n in pictures})
+
+
+@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("by_ways", [True, False])
+def test_a_search_whose_ways_lead_back_is_taken_throughout_though_it_matches_worse(number, by_ways):
+    pictures, quick, search = repeating()
+    source = BetterMatch(quick, search, by_ways=by_ways)
+    motion, depth = source.shot(pictures.get)(number)
+    assert source.reach((WIDTH, HEIGHT)) == (4 if by_ways else 3)
+    is_searched = depth == 0.5
+    assert is_searched.all() if by_ways else is_searched[20:-20, 20:-20].mean() < 0.5
+    np.testing.assert_array_equal(is_searched, motion[..., 2] == np.float32(10.3))
+
+
+def test_where_neither_loses_clearly_less_the_match_decides():
+    """The search loses as much: it follows the repeat as well, in the other pictures."""
+    pictures, quick, search = repeating()
+    size = HEIGHT, WIDTH
+    search.motions = {n: found(-13.7 if n % 2 else 10.3, 0.5, *size) for n in pictures}
+    _, depth = BetterMatch(quick, search, by_ways=True).shot(pictures.get)(2)
+    assert (depth[20:-20, 20:-20] == 1).all()
+
+
+def test_each_picture_of_a_shot_is_asked_for_once_and_the_order_changes_nothing():
+    pictures, quick, search = repeating()
+    shot = BetterMatch(quick, search, by_ways=True).shot(pictures.get)
+    inner = [shot(n) for n in range(COUNT)]
+    assert shot(COUNT) is None
+    for source in (quick, search):
+        assert sorted(n for n in source.asked if 0 <= n < COUNT) == list(range(COUNT))
+    for n in (4, 1, 3, 0, 2):
+        for one, other in zip(shot(n), inner[n], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize("first", [0, 3, 7])
 def test_whether_a_picture_loses_something_depends_on_its_neighbours_alone(first):
     """A disc is too fast for some pictures of a shot; they and those beside them count."""

@@ -5,7 +5,7 @@ import pytest
 
 import make_frames as make
 from wgmb.flow.dis import Dis
-from wgmb.flow.dis.consistency import APART, SHARE, Consistency, returns
+from wgmb.flow.dis.consistency import APART, SHARE, SPACING, Consistency, lost, returns
 
 pytestmark = pytest.mark.fast
 
@@ -27,6 +27,20 @@ def test_ways_there_and_back_are_compared_where_they_lead():
     back = -np.roll(way, 1, axis=1)
     found = returns(way, back, 4)
     assert (found == returns_slowly(way, back, 4)).all() and 0.1 < found.mean() < 0.9
+
+
+@pytest.mark.parametrize("numbers", [(0, 1, 2), (1, 2), (0, 1)])
+def test_lost_is_what_changes_and_leads_back_from_no_neighbour_that_is_there(numbers):
+    rng = np.random.default_rng(4)
+    ways = {n: tuple(rng.integers(-4, 4, (2, 9, 14, 2))) for n in numbers}
+    changes = rng.random((9, 14)) < 0.7
+    want = changes.copy()
+    if 0 in ways:
+        want &= ~returns_slowly(ways[1][0], ways[0][1], SPACING)
+    if 2 in ways:
+        want &= ~returns_slowly(ways[1][1], ways[2][0], SPACING)
+    np.testing.assert_array_equal(lost(ways, 1, changes), want)
+    assert 0.02 < want.mean() < 0.68
 
 
 CHANGED = np.full((16, 24), 90, np.uint8)

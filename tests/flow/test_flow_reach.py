@@ -37,7 +37,13 @@ def test_best_looks_farther_with_every_level(width):
 
 
 def test_a_job_watches_as_many_files_as_motion_depends_on():
-    assert Flow().reach((16384, 16384)) == FAR
+    flow, largest = Flow(), (16384, 16384)
+    assert flow.reach(largest) <= FAR
+    pytest.importorskip("cv2")
+    from wgmb.flow.dis import Dis
+    from wgmb.flow.dis.better_match import BetterMatch
+
+    assert BetterMatch(Dis(), flow, by_ways=True).reach(largest) == FAR
 
 
 @pytest.mark.parametrize("quality", ["fast", "draft"])
@@ -45,6 +51,15 @@ def test_a_job_watches_as_many_files_as_motion_depends_on():
 def test_quick_searches_do_not_look_farther_than_they_tell(quality, width):
     flow = Flow(quality=quality)
     assert farthest(flow, width, True) <= flow.reach((width, HEIGHT))
+
+
+def test_two_sources_whose_ways_are_compared_do_not_look_farther_than_they_tell():
+    pytest.importorskip("cv2")
+    from wgmb.flow.dis import Dis
+    from wgmb.flow.dis.better_match import BetterMatch
+
+    both = BetterMatch(Dis("best"), Flow(quality="fast", whole=True), by_ways=True)
+    assert farthest(both, 160, True) <= both.reach((160, HEIGHT))
 
 
 def test_dense_inverse_search_does_not_look_farther_than_it_tells():

@@ -103,5 +103,7 @@ def test_without_a_gpu_the_best_search_takes_dense_inverse_search_where_that_mat
     is_mixed = quality == "best" and is_slow
     assert type(motion) is (BetterMatch if is_mixed else Flow)
     assert ("dense inverse search" in how) == is_mixed
+    if is_mixed:
+        assert motion.reach((640, 360)) == 1 + Flow(quality="fast", device=device).reach((640, 360))
     monkeypatch.setattr("wgmb.settings.video.is_installed", lambda package: False)
     assert type(settings.source(device)[0]) is Flow and settings.source(device)[1] == "search"

@@ -10,7 +10,7 @@ from ..shots.motion import Found, MotionSource, ShotMotion
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
-FAR = 9  # frames around one that its motion may depend on, in pictures of up to 16,384 px
+FAR = 10  # frames around one that its motion may depend on, in pictures of up to 16,384 px
 
 
 def standing(source: FrameFile) -> Found:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
-_MARGINS = {"fast": 1.1, "draft": 1.5}  # of searches beside dense inverse search, see BetterMatch
+_MARGIN = 1.5  # of that search beside dense inverse search, see BetterMatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class FlowSettings:
             from ..flow.dis.better_match import BetterMatch
 
             search = Flow(quality="fast", device=device, whole=True)
-            return BetterMatch(Dis("best"), search, _MARGINS["fast"]), how
+            return BetterMatch(Dis("best"), search, by_ways=True), how
         return Flow(quality=settings.flow_quality, device=device), how
 
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:
@@ -82,7 +82,7 @@ class FlowSettings:
         from ..flow.dis.better_match import BetterMatch
 
         search = Flow(quality=_FALLBACK, device=device)
-        return BetterMatch(Dis("best"), search, _MARGINS[_FALLBACK])
+        return BetterMatch(Dis("best"), search, _MARGIN)
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""

@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import Flow
+from .consistency import SHARE, SPACING, changing, lost
 from .inverse_search import Dis, Found
 
 LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match
 AROUND = 25  # px of these a side over which matches are averaged
-CLEARLY = 0.8  # of the one's mean difference in a picture: below it, the other is right throughout
+CLEARLY = 0.8  # of the one's mean difference in a picture, or of what it loses there: below it, the
+# other is right throughout
 
 
 class Both(NamedTuple):
@@ -32,14 +34,18 @@ class BetterMatch:
     thorough dense inverse search makes it small also where it follows something else. A search that
     finds nothing leaves states without order, which are specks in a blurred picture; there, dense
     inverse search is smooth.
+
+    `by_ways`: the search is taken throughout also where it loses clearly less of a picture, by the
+    ways there and back (consistency.py). For that, those beside a picture are searched, too.
     """
 
-    def __init__(self, quick: Dis, search: Flow, margin: float = 1.0):
+    def __init__(self, quick: Dis, search: Flow, margin: float = 1.0, by_ways: bool = False):
         self._quick, self._search, self._margin = quick, search, margin
+        self._by_ways = by_ways
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on."""
-        return max(self._quick.reach(size), self._search.reach(size))
+        return self._by_ways + max(self._quick.reach(size), self._search.reach(size))
 
     def shot(
         self, load: Callable[[int], Both | np.ndarray | None], depth: bool = True
@@ -59,16 +65,62 @@ class BetterMatch:
             picture = load(number)
             return picture.light() if isinstance(picture, Both) else picture
 
-        quick, search = self._quick.shot(grey, depth), self._search.shot(light)
+        sources = _Sources(self._quick.shot(grey, depth), self._search.shot(light))
 
         def better_of(number: int) -> Found | None:
-            one, other = quick(number), search(number)
-            if one is None or other is None:
+            found = sources(number)
+            if found is None:
                 return None
+            one, other = found
             near = [grey(n) for n in (number - 1, number, number + 1)]
+            if self._by_ways:
+                prev, here, next = near
+                assert here is not None
+                changes = changing(self._quick.change(prev, here, next))
+                loss, others = sources.lost(number, changes)
+                if loss > SHARE and others < CLEARLY * loss:
+                    return other[0], None if one[1] is None else other[1]
             return better(near, one, other, self._margin)
 
         return better_of
+
+
+class _Sources:
+    """The motion of a shot's pictures by two sources, each found once, and what they lose."""
+
+    def __init__(self, *shots: Callable[[int], Found | None]):
+        self._shots = shots
+        self._ahead: dict[int, list[Found]] = {}
+        self._ways: list[dict[int, tuple[np.ndarray, np.ndarray]]] = [{} for _ in shots]
+
+    def __call__(self, number: int) -> list[Found] | None:
+        """Motion and depth of a picture by each source; None where it is alone."""
+        for old in [n for n in self._ahead if n < number]:
+            del self._ahead[old]
+        return self._ahead.pop(number, None) or self._motion_of(number)
+
+    def lost(self, number: int, changes: np.ndarray) -> list[float]:
+        """The share of a picture that each source loses, see consistency.lost.
+
+        The motion of the next picture is kept until it is asked for.
+        """
+        for ways in self._ways:
+            for old in [n for n in ways if abs(n - number) > 1]:
+                del ways[old]
+        for n in (number - 1, number + 1):
+            if n not in self._ways[0] and (found := self._motion_of(n)) is not None and n > number:
+                self._ahead[n] = found
+        return [float(lost(ways, number, changes).mean()) for ways in self._ways]
+
+    def _motion_of(self, number: int) -> list[Found] | None:
+        found = [shot(number) for shot in self._shots]
+        sure = [one for one in found if one is not None]
+        if len(sure) < len(found):
+            return None
+        for ways, (motion, _) in zip(self._ways, sure, strict=True):
+            thin = motion[::SPACING, ::SPACING]
+            ways[number] = thin[..., :2].copy(), thin[..., 2:].copy()
+        return sure
 
 
 def better(near: list[np.ndarray | None], one: Found, other: Found, margin: float = 1.0) -> Found:

@@ -28,6 +28,26 @@ def returns(way: np.ndarray, back: np.ndarray, spacing: int) -> np.ndarray:
     return ~is_inside | (np.hypot(apart[..., 0], apart[..., 1]) <= APART)
 
 
+def lost(
+    ways: dict[int, tuple[np.ndarray, np.ndarray]], number: int, changes: np.ndarray
+) -> np.ndarray:
+    """(height, width) bool: pixels that change, of which no way to a neighbour leads back.
+
+    `ways`: those (height, width, 2) [px] to the previous and the next picture of a picture and its
+    neighbours, by number, of every pixel `SPACING` px apart.
+    """
+    found = np.zeros(changes.shape, bool)
+    for side in (0, 1):
+        if (other := number + 2 * side - 1) in ways:
+            found |= returns(ways[number][side], ways[other][1 - side], SPACING)
+    return changes & ~found
+
+
+def changing(change: np.ndarray) -> np.ndarray:
+    """Blocks that differ from the neighbours by more than noise does, bool, by that difference."""
+    return change > CHANGE + np.percentile(change, QUIET)
+
+
 class Consistency:
     """Tells in which pictures of a shot the ways of too many pixels do not lead back.
 
@@ -73,15 +93,11 @@ class Consistency:
         return number in self._ways
 
     def _judge(self, number: int) -> None:
-        to_prev, to_next = self._ways[number]
-        prev_back, next_back = self._ways[number - 1][1], self._ways[number + 1][0]
-        found = returns(to_prev, prev_back, SPACING) | returns(to_next, next_back, SPACING)
-        change = self._changes[number]
-        changes = change > CHANGE + np.percentile(change, QUIET)
-        changing, lost = float(changes.mean()), float((changes & ~found).mean())
-        self.shares[number] = lost
-        self.loses[number] = lost > SHARE or (
-            changing > LEAST and lost > SHARE_OF_CHANGES * changing
+        changes = changing(self._changes[number])
+        share, changed = float(lost(self._ways, number, changes).mean()), float(changes.mean())
+        self.shares[number] = share
+        self.loses[number] = share > SHARE or (
+            changed > LEAST and share > SHARE_OF_CHANGES * changed
         )
 
     @property

@@ -104,15 +104,19 @@ class Dis:
             return motion
         return self._motion(prev, here, next, _HALVINGS)
 
-    def change(self, prev: np.ndarray, here: np.ndarray, next: np.ndarray) -> np.ndarray:
-        """By how much blocks of `SPACING` differ from both neighbours, 0 to 255."""
+    def change(
+        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None
+    ) -> np.ndarray:
+        """By how much blocks of `SPACING` differ from each neighbour that is there, 0 to 255."""
         size = tuple(-(-n // SPACING) for n in here.shape[::-1])
         area = self._cv2.INTER_AREA
-        prev, next = (
-            self._cv2.resize(self._cv2.absdiff(here, other), size, interpolation=area)
-            for other in (prev, next)
+        return np.minimum.reduce(
+            [
+                self._cv2.resize(self._cv2.absdiff(here, other), size, interpolation=area)
+                for other in (prev, next)
+                if other is not None
+            ]
         )
-        return np.minimum(prev, next)
 
     def _motion(
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, finest: int
