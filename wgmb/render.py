@@ -247,14 +247,15 @@ class Render:
         lit = {}
         if abs(offset) <= 1 and "diffuse_light" in blur.method.uses:
             lit = self._light(time, number, offset, blur, timing)
+        view = self._images.view_of
         return FrameViews(
-            color=seen["color"].create_view(),
-            depth=seen["depth"].create_view(),
-            normal=seen["normal"].create_view(),
-            object_id=seen["object"].create_view(),
+            color=view(seen["color"]),
+            depth=view(seen["depth"]),
+            normal=view(seen["normal"]),
+            object_id=view(seen["object"]),
             camera=seen["camera"],
-            diffuse_light=lit["diffuse_light"].create_view() if lit else None,
-            diffuse_color=lit["diffuse_color"].create_view() if lit else None,
+            diffuse_light=view(lit["diffuse_light"]) if lit else None,
+            diffuse_color=view(lit["diffuse_color"]) if lit else None,
         )
 
     def _light(

@@ -10,6 +10,7 @@ import wgpu
 import wgmb
 from wgmb import gpu
 from wgmb.gpu import bind_groups
+from wgmb.scene import builtin
 
 SIZE = 40, 24
 METHODS = ("tap", "tiles", "reproject", "gather")
@@ -56,6 +57,19 @@ def test_a_second_frame_makes_no_bind_groups_and_has_the_same_bits(device, made,
     fresh = wgmb.Blur(method, device=device, output="rgba16float")
     fresh._groups = None  # every group anew
     assert np.array_equal(blurred(fresh, *there), first)
+
+
+def test_a_second_picture_of_a_scene_makes_no_bind_groups(device, made):
+    """Nor where light is followed, in buffers and views of its own."""
+    blur = wgmb.Blur("gather", device=device, output="rgba16float")
+    render = wgmb.Render(builtin.make("crossing"), blur, size=SIZE)
+    pool = wgmb.gpu.textures.TexturePool(device)
+    view = pool.view("output", SIZE, "rgba16float")
+    render.draw(view, 0.0)
+    assert made
+    made.clear()
+    render.draw(view, 0.0)
+    assert not made
 
 
 def test_other_textures_and_other_numbers_get_other_groups(device):

@@ -134,7 +134,7 @@ class Search:
             layers = self._images.view_of(none, dimension="2d-array")
             changes = self._no_changes.at_least(4)
         else:
-            layers, times = added.layers.create_view(dimension="2d-array"), added.times
+            layers, times = added.view, added.times
             changes = added.change_flags
             nodes["first"], nodes["step"], nodes["count"] = times.first, times.step, times.count
         return {

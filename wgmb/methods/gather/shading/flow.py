@@ -68,8 +68,9 @@ def pyramid(stage: Stage, name: str, source: View) -> list[Level]:
     for i, size in enumerate(level_sizes(stage.size)[1:], 1):
         names = (f"level {i} {kind}{name}" for kind in ("", "squares "))
         level = Level(*(stage.texture(name, format, size) for name in names))
-        stage.run("pyramid", "halve", size=size, source=levels[-1].gradients,
-                  level=level.gradients, squares=level.squares)  # fmt: skip
+        stage.run("pyramid", "halve", size=size, constants={"LEVEL": i},
+                  source=levels[-1].gradients, level=level.gradients,
+                  squares=level.squares)  # fmt: skip
         levels.append(level)
     return levels
 
@@ -111,9 +112,9 @@ def _extrapolated(
     none = stage.none("rgba16float")
     bodies = stage.sparse("bodies", "rgba16float", grid_of_cells(stage.size))
 
-    def run(entry: str, side: int, **bindings: View) -> None:
+    def run(entry: str, side: int, **bindings: Any) -> None:
         way, other = searched[side], searched.get(-side)
-        given = {
+        given: dict[str, Any] = {
             "values": values[0], "values_there": values[side], "change": changed[side],
             "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
             "bodies": bodies, "around": wide, "around_other": wide,
@@ -125,7 +126,7 @@ def _extrapolated(
         )
 
     wide = stage.none("rgba32float")
-    run("find_bodies", next(iter(searched)), bodies=none, bodies_out=bodies)
+    run("find_bodies", next(iter(searched)), halved=True, bodies=none, bodies_out=bodies)
     around, result = {}, {}
     weighted = stage.sparse("weighted", "rgba32float")
     for side in searched:
@@ -180,7 +181,7 @@ def _flow(
 def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     """A Gaussian of `sigma` [px], at half the size."""
     half = stage.sparse("half blurred", "rgba32float", half_size(stage.size))
-    given: dict[str, Any] = {"over": "near", "constants": {"SIGMA": sigma}}
+    given: dict[str, Any] = {"over": "near", "halved": True, "constants": {"SIGMA": sigma}}
     stage.run("blur", "across", source=source, output=half, **given)
     stage.run("blur", "down", source=half, output=output, **given)
 

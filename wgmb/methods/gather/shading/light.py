@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 import wgpu
 
 from ....gpu import wgsl
@@ -21,9 +20,10 @@ from .flow import (
     planes,
     pyramid,
 )
-from .stage import FOLDER, Stage
+from .stage import FOLDER, GATES_SIZE, Stage
 from .values import values
 
+_LISTS = "doubtful", "changing", "beside", "near", "whole"  # of tiles: see near.wgsl
 NODES = 8  # times of an exposure at which light is known, at most
 
 
@@ -73,6 +73,7 @@ class Added:
     """
 
     layers: wgpu.GPUTexture
+    view: View  # of all layers
     times: LightTimes
     change_flags: wgpu.GPUBuffer
 
@@ -85,25 +86,22 @@ class MovingLight:
         self._device, self._images = device, TexturePool(device)
         self._confidence = confidence
         self._pushed = {name: ScratchBuffer(device) for name in ("from_here", "from_there")}
+        self._kept = {name: ScratchBuffer(device) for name in ("change flags", "gates", *_LISTS)}
 
     def encode(
         self, encoder, bindings, kinds: Sequence[Kind], times: LightTimes, weight: View | None
     ) -> Added:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
-        usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
-        change_flags = self._device.create_buffer_with_data(
-            label="change flags",
-            data=np.zeros(1 + math.prod(_tile_grid(bindings.size)), np.uint32),
-            usage=usage,
-        )
-        lists: dict[str, Any] = {
-            name: self._device.create_buffer(
-                label=name,
-                size=16 * (2 + change_flags.size // 16),
-                usage=usage | wgpu.BufferUsage.INDIRECT,
-            )
-            for name in ("doubtful", "changing", "beside", "near", "whole")
+        tiles = math.prod(_tile_grid(bindings.size))
+        sizes = {"change flags": 4 * (1 + tiles), "gates": GATES_SIZE}
+        kept = {
+            name: buffer.at_least(sizes.get(name, 16 * (3 + tiles // 4)))
+            for name, buffer in self._kept.items()
         }
+        for buffer in kept.values():
+            encoder.clear_buffer(buffer)
+        change_flags, gates = kept.pop("change flags"), kept.pop("gates")
+        lists: dict[str, Any] = kept
         stage = Stage(
             self._device, self._images, encoder, bindings, "", False, {}, change_flags, lists
         )
@@ -111,24 +109,25 @@ class MovingLight:
             replace(stage, name="glossy" if kind.pulled else "diffuse", pulled=kind.pulled)
             for kind in kinds
         ]
-        tiles = _tile_grid(stage.size)
+        grid = _tile_grid(stage.size)
         for stage, kind in zip(stages, kinds, strict=True):
             screen(stage, kind.frames)
-        stage.run("near", "list_doubtful", size=tiles, **lists)
+        stage.run("near", "list_doubtful", size=grid, **lists)
         stage.run("near", "size_doubtful", size=(1, 1), **lists)
         changed = [
             changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
-        stage.run("near", "main", size=tiles, **lists)
+        stage.run("near", "main", size=grid, **lists)
         stage.run("near", "size_lists", size=(1, 1), **lists)
-        gated = stage.gated(grids(stage.size)).gates
+        gated = stage.gated(grids(stage.size), gates).gates
         earlier = None
         for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
             stage = replace(stage, gates=gated)
             earlier = self._layers(stage, kind, by_side, times, weight, earlier)
         assert earlier is not None, "no kind of light"
-        return Added(earlier, times, change_flags)
+        every = self._images.view_of(earlier, dimension="2d-array")
+        return Added(earlier, every, times, change_flags)
 
     def _layers(
         self,
@@ -200,21 +199,22 @@ class MovingLight:
                     over=over,
                     node=stage.uniform("compose", "Node", time=share),
                     before=changed.get(side, none) if entry == "add_neighbour" else before,
-                    earlier=none if earlier is None else layer_of(earlier, i),
-                    added=layer_of(result, i),
+                    earlier=none if earlier is None else self._layer(earlier, i),
+                    added=self._layer(result, i),
                     range=range,
                     range_out=range_out,
                     **both,
                 )
         return result
 
+    def _layer(self, texture: wgpu.GPUTexture, index: int) -> View:
+        """One layer of an array texture, as a texture of its own."""
+        return self._images.view_of(
+            texture, dimension="2d", base_array_layer=index, array_layer_count=1
+        )
+
 
 def _tile_grid(size: tuple[int, int]) -> tuple[int, int]:
     """Tiles of the change flags across and down."""
     side = int(wgsl.load(f"{FOLDER}/active.wgsl").constant("LIGHT_TILE"))
     return -(-size[0] // side), -(-size[1] // side)
-
-
-def layer_of(texture: wgpu.GPUTexture, index: int) -> View:
-    """One layer of an array texture, as a texture of its own."""
-    return texture.create_view(dimension="2d", base_array_layer=index, array_layer_count=1)

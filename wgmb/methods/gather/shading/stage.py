@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import wgpu
@@ -15,6 +17,8 @@ from ....gpu.textures import TexturePool
 
 FOLDER = "methods/gather/shading"
 _GATES = int(wgsl.load(f"{FOLDER}/gate.wgsl").constant("GATES"))
+_HALVED = int(wgsl.load(f"{FOLDER}/active.wgsl").constant("HALVED"))
+GATES_SIZE = 4 * 3 * _GATES  # bytes
 
 
 @dataclass(frozen=True)
@@ -74,27 +78,28 @@ class Stage:
         *,
         size: tuple[int, int] | None = None,
         over: str | None = None,
+        halved: bool = False,
         constants: dict[str, float] | None = None,
         **resources,
     ) -> None:
         """Record one entry point over `size` invocations, over a list of tiles, or over the image.
 
-        The textures of another size than the frame's come with their own.
+        `halved`: over the tiles of an image of half the frame's size or less. The textures of
+        another size than the frame's come with their own.
         """
         path, given = f"{FOLDER}/{file}.wgsl", dict(constants or {})
-        text = wgsl.load(path).text
-        if "override PULLED" in text:
+        takes = _takes(path)
+        if takes.kind:
             given["PULLED"] = self.pulled
-        given_ones = re.findall(r"var (\w+): .*// stored as given", text)
-        texels = {name: gpu.stored(resources[name]) for name in given_ones}
+        texels = {name: gpu.stored(resources[name]) for name in takes.textures}
         kernel = gpu.kernel(self.device, path, texels, **given)
         size = size or self.size
         gate = self.gates.get(size) if self.gates else None
         if over:
-            gate = {"buffer": self.lists[over], "offset": 0, "size": 12}
-        if "> listed:" in text:
+            gate = {"buffer": self.lists[over], "offset": 4 * _HALVED if halved else 0, "size": 12}
+        if takes.listed:
             resources["listed"] = self.lists[over or "whole"]
-        if "> found:" in text:
+        if takes.flags:
             resources["found"] = self.change_flags
         if self.gates and gate is None:
             raise KeyError(f"no gate for passes of {size}")
@@ -104,19 +109,32 @@ class Stage:
         """The struct of a file with these values, the others 0."""
         return gpu.uniform(self.device, f"{FOLDER}/{file}.wgsl", struct, **values)
 
-    def gated(self, sizes: list[tuple[int, int]]) -> Stage:
-        """The same, whose passes of these sizes run only if `change_flags` says so."""
+    def gated(self, sizes: list[tuple[int, int]], gates: wgpu.GPUBuffer) -> Stage:
+        """The same, whose passes of these sizes run only if `change_flags` says so; `gates` holds
+        how many workgroups they take.
+        """
         assert len(sizes) <= _GATES
         counts = np.zeros((_GATES, 4), np.uint32)
         counts[: len(sizes), :2] = sizes
-        length = 4 * 3 * _GATES
-        usage = wgpu.BufferUsage
-        gates = self.device.create_buffer(
-            label="gates", size=length, usage=usage.STORAGE | usage.INDIRECT
-        )
         self.run("gate", size=(1, 1), sizes=self.uniform("gate", "Sizes", counts=counts),
                  gates=gates)  # fmt: skip
         each = {
             size: {"buffer": gates, "offset": 12 * i, "size": 12} for i, size in enumerate(sizes)
         }
         return replace(self, gates=each)
+
+
+class _Takes(NamedTuple):
+    """Bindings and constants of a file: kind of light, list of tiles, flags, textures as given."""
+
+    kind: bool
+    listed: bool
+    flags: bool
+    textures: tuple[str, ...]
+
+
+@cache
+def _takes(path: str) -> _Takes:
+    text = wgsl.load(path).text
+    textures = tuple(re.findall(r"var (\w+): .*// stored as given", text))
+    return _Takes("override PULLED" in text, "> listed:" in text, "> found:" in text, textures)

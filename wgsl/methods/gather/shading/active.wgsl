@@ -16,8 +16,10 @@ fn light_tile(px: vec2u) -> u32 {
     return px.y / LIGHT_TILE * across + px.x / LIGHT_TILE;
 }
 
-// A list of tiles: workgroups of an indirect dispatch over their pixels, WG_X * WG_Y each; the number of tiles; the tiles.
+// A list of tiles: workgroups of an indirect dispatch over their pixels, WG_X * WG_Y each; the number of tiles; workgroups of
+// one over an image of half the size or less, one a tile; a word that is free; the tiles.
 const TILE_GROUPS = LIGHT_TILE * LIGHT_TILE / (WG_X * WG_Y);   // of a tile
 const LIGHT_GROUPS_PER_ROW: u32 = 32768u;     // of a dispatch; devices take 65,535
 const LISTED: u32 = 3u;         // word of the number
-const FIRST_LISTED: u32 = 4u;
+const HALVED: u32 = 4u;         // first word of the workgroups for the smaller image
+const FIRST_LISTED: u32 = 8u;

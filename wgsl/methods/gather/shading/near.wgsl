@@ -17,6 +17,8 @@ struct Found {
 struct TileList {       // see active.wgsl
     groups: vec3u,
     count: atomic<u32>,
+    halved: vec3u,
+    free: u32,
     tiles: array<u32>,
 }
 
@@ -30,7 +32,7 @@ fn list_doubtful(@builtin(global_invocation_id) id: vec3u) {
 
 @compute @workgroup_size(1)
 fn size_doubtful() {
-    doubtful.groups = groups_for(atomicLoad(&doubtful.count));
+    doubtful.groups = groups_for(TILE_GROUPS * atomicLoad(&doubtful.count));
 }
 
 /// After `limit_ratio`: an invocation is a tile.
@@ -55,14 +57,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 fn size_lists() {
     let tiles = light_tiles();
     atomicStore(&whole.count, select(0u, tiles.x * tiles.y, atomicLoad(&changing.count) > 0u));
-    changing.groups = groups_for(atomicLoad(&changing.count));
-    near.groups = groups_for(atomicLoad(&near.count));
-    beside.groups = groups_for(atomicLoad(&beside.count));
-    whole.groups = groups_for(atomicLoad(&whole.count));
+    changing.groups = groups_for(TILE_GROUPS * atomicLoad(&changing.count));
+    near.halved = groups_for(atomicLoad(&near.count));
+    near.groups = groups_for(TILE_GROUPS * atomicLoad(&near.count));
+    beside.groups = groups_for(TILE_GROUPS * atomicLoad(&beside.count));
+    whole.groups = groups_for(TILE_GROUPS * atomicLoad(&whole.count));
 }
 
-fn groups_for(tiles: u32) -> vec3u {
-    let wanted = tiles * TILE_GROUPS;
+fn groups_for(wanted: u32) -> vec3u {
     return vec3u(min(wanted, LIGHT_GROUPS_PER_ROW), (wanted + LIGHT_GROUPS_PER_ROW - 1u) / LIGHT_GROUPS_PER_ROW, 1u);
 }
 

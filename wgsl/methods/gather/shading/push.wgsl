@@ -29,17 +29,22 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     if any(id >= frame.size) { return; }
     let here = moved(id, textureLoad(values, id, 0), textureLoad(flow, id, 0), push.time);
     let there = moved(id, textureLoad(values_there, id, 0), textureLoad(flow_back, id, 0), 1.0 - push.time);
-    if max(here.parts.w, there.parts.w) <= 0.0 { return; }
-    for (var k = 0u; k < 4u; k++) {
-        let one = splat(here, k);
-        if any(one.yz != vec2u(0u)) {
-            atomicAdd(&from_here[one.x], one.y);
-            atomicAdd(&from_here[one.x + 1u], one.z);
+    if here.parts.w > 0.0 {
+        for (var k = 0u; k < 4u; k++) {
+            let one = splat(here, k);
+            if any(one.yz != vec2u(0u)) {
+                atomicAdd(&from_here[one.x], one.y);
+                atomicAdd(&from_here[one.x + 1u], one.z);
+            }
         }
-        let other = splat(there, k);
-        if any(other.yz != vec2u(0u)) {
-            atomicAdd(&from_there[other.x], other.y);
-            atomicAdd(&from_there[other.x + 1u], other.z);
+    }
+    if there.parts.w > 0.0 {
+        for (var k = 0u; k < 4u; k++) {
+            let one = splat(there, k);
+            if any(one.yz != vec2u(0u)) {
+                atomicAdd(&from_there[one.x], one.y);
+                atomicAdd(&from_there[one.x + 1u], one.z);
+            }
         }
     }
 }

@@ -2,6 +2,7 @@
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl
+//#include methods/gather/shading/resting.wgsl
 
 @group(1) @binding(0) var source: texture_2d<f32>;      // stored as rgba16float: values, or the finer level
 @group(1) @binding(1) var level: Level;                 // brightness, of shadows less 1; its change a pixel across, down
@@ -9,6 +10,9 @@
 
 alias Level = texture_storage_2d<rgba16float, write>;
 
+override LEVEL: u32 = 1u;       // that `halve` writes
+
+const FINE: u32 = 4u;           // level up to which a pixel and those beside it are in one tile and those beside it
 const CONTRAST: f32 = 0.2;      // of a logarithm of light
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -29,6 +33,11 @@ fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
 fn halve(@builtin(global_invocation_id) id: vec3u) {
     let px = vec2i(id.xy);
     if any(px >= (vec2i(textureDimensions(source)) + 1) / 2) { return; }
+    if !PULLED && LEVEL <= FINE && is_black_around(min(id.xy << vec2u(LEVEL), frame.size - 1u)) {
+        textureStore(level, px, vec4f(0.0));
+        textureStore(squares, px, vec4f(0.0));
+        return;
+    }
     let own = quarter(px);
     let right = quarter(px + vec2i(1, 0));
     let below = quarter(px + vec2i(0, 1));

@@ -7,3 +7,8 @@
 fn is_near(px: vec2u) -> bool {
     return (found[1u + light_tile(px)] & NEAR) != 0u;
 }
+
+/// True where textures of passes over tiles near changes are 0, and in all tiles beside it.
+fn is_black_around(px: vec2u) -> bool {
+    return (found[1u + light_tile(px)] >> DISTANCE_BITS) > u32(NEAR_TILES) + 1u;
+}

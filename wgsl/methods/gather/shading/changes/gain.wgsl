@@ -131,9 +131,11 @@ fn limit_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     let id = listed_pixel(group, local);
     if any(id >= frame.size) { return; }
     let px = vec2i(id);
+    let own = textureLoad(ratio, px, 0);
+    let rows = select(-RADIUS - 1, RADIUS, any(own.a * own.rgb != vec3f(0.0)));     // none where there is nothing to limit
     var sum = 0.0;
-    var total = 0.0;
-    for (var y = -RADIUS; y <= RADIUS; y++) {
+    var total = 1e-20;
+    for (var y = -RADIUS; y <= rows; y++) {
         let of_row = weight_of(y);
         for (var x = -RADIUS; x <= RADIUS; x++) {
             let weight = of_row * weight_of(x);
@@ -142,7 +144,6 @@ fn limit_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
             total += weight;
         }
     }
-    let own = textureLoad(ratio, px, 0);
     let change = clamp(sum / total * own.a * own.rgb, vec3f(-MOST), vec3f(MOST));
     if any(change != vec3f(0.0)) {
         atomicMax(&found.any, 1u);
