@@ -13,7 +13,7 @@
 #   --offline         then all commands once more, without a network
 #   --interrupted     first break each command off after 1, 2, 4, ... s as Ctrl-C does, each time
 #                     followed by a try without a network; the commands must work all the same
-#   --keep            keep the roots in build/bare, where --again uses them as they are
+#   --keep            keep the roots in build/bare, where --again uses them, with the commit of today
 #
 # Needs root, debootstrap, and for Ubuntu its keys (the package ubuntu-keyring).
 set -eu
@@ -129,6 +129,8 @@ for system in "${systems[@]}"; do
     home=$root/root owner=0:0
     [ "$who" = root ] || home=$root/home/somebody owner=1000:1000
     [ -d "$home/$folder" ] || git clone --quiet --no-hardlinks "$here" "$home/$folder"
+    there=(git -c safe.directory='*' -C "$home/$folder")
+    "${there[@]}" fetch --quiet "$here" HEAD && "${there[@]}" reset --quiet --hard FETCH_HEAD
     chown -R $owner "$home/$folder"
     for command in "$@"; do
         [ -z "$interrupted" ] || interrupt "$system" "$root" "$command"

@@ -20,7 +20,6 @@ const ASTRAY_SHARE: f32 = 0.1;  // and this share of the flow; twice as far, not
 const UNLIKE: f32 = 0.2;        // difference of values trusted wholly,
 const UNLIKE_SHARE: f32 = 0.5;  // and this share of the value
 const SLOPE_REACH: i32 = 2;     // [px] to either side, over which the slope of a surface is measured
-const PRESENT: f32 = 0.1;       // value from which on there is something to move
 
 /// Of the flow as it was found, weighted.
 @compute @workgroup_size(WG_X, WG_Y)

@@ -26,10 +26,10 @@ override NEXT: bool = false;    // the neighbour is the next frame
 const CLEARLY: f32 = 0.75;      // share of other differences from which on less is clearly less
 const MISSED: f32 = 0.85;       // share of the differences without flow from which on it explains nothing,
 const EXPLAINED: f32 = 0.6;     // and up to which it explains them
-const PRESENT: f32 = 0.1;       // value from which on there is something to move
 const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
+const SOME: f32 = 0.01;         // the same from which on it is told at all
 const SURE: f32 = 0.75;         // how much the motion of a body has to explain
-const UNLIKE: f32 = 0.3;       // difference of values from which on flow around does not fit
+const UNLIKE: f32 = 0.3;        // difference of values from which on flow around does not fit
 const CELL: u32 = 4u;           // side [px]
 const RINGS: u32 = 6u;          // around a cell, in which bodies are looked for,
 const FIRST_RING: f32 = 3.0;    // [px]
@@ -177,7 +177,7 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let keep = max(own.z * own.w, 1.0 - fits);
     let explains = max(own.w, fits * min(near.z / ENOUGH, 1.0));
     let filled = vec4f(mix(way, own.xy, keep), mix(1.0, own.z, keep), explains);
-    let result = select(own, filled, near.z > 0.2 * ENOUGH);
+    let result = select(own, filled, near.z > SOME);
     let is_searched = chosen.z >= 0.0 && near.z <= ENOUGH;
     textureStore(flow_out, id, vec4f(result.xyz, select(-result.w, result.w, is_searched)));
 }

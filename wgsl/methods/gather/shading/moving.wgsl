@@ -6,6 +6,8 @@
 @group(1) @binding(8) var flow: texture_2d<f32>;        // stored as rgba16float: to the other frame [px]; trust; see `settle` of extrapolate.wgsl
 @group(1) @binding(9) var flow_back: texture_2d<f32>;   // stored as rgba16float
 
+const PRESENT: f32 = 0.1;       // value from which on there is something to move
+
 fn values_at(at: vec2f) -> vec4f {
     let s = square_around(at);
     return mixed(s, textureLoad(values, s.pair.xy, 0), textureLoad(values, s.pair.zy, 0),

@@ -14,8 +14,6 @@ struct Push {
 @group(1) @binding(1) var<storage, read_write> from_here: array<atomic<u32>>;   // two words a pixel: see unpack_pushed()
 @group(1) @binding(2) var<storage, read_write> from_there: array<atomic<u32>>;
 
-const PRESENT: f32 = 0.1;       // value from which on there is something to move
-
 struct Moved {          // darkness on its way
     parts: vec4f,       // see unpack_pushed()
     corner: vec2i,      // the first of the four pixels that it comes to
