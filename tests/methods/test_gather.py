@@ -218,6 +218,26 @@ def test_what_all_frames_hide_is_like_what_is_around():
     assert np.abs(picture - truth)[14:50, 30:90][hidden].max() < 0.06
 
 
+def rolling(t):
+    """A body behind a pole: it moves by 8 px a frame, what is seen of it by 20, as of a wheel."""
+    x = np.arange(64) + 0.5 + np.zeros((24, 1))
+    body = abs(x - 27 - 8 * t) < 7
+    pole = abs(x - 32) < 4
+    depth = np.where(pole, 2.0, np.where(body, 5.0, 9.0)).astype("f4")
+    tone = np.where(pole, 0.0, np.where(body, 0.9, 0.2)).astype("f4")
+    motion = np.zeros((24, 64, 4), "f4")
+    motion[body & ~pole] = -20, 0, 20, 0
+    return np.dstack([tone] * 3 + [np.ones_like(tone)]), motion, depth
+
+
+def test_a_surface_goes_on_behind_something_nearer():
+    """No frame shows the end of the body: it is not there yet when the pole hides what was seen."""
+    times = SHUTTER.sample_times(64).astype(float)
+    truth = np.mean([rolling(t)[0] for t in times], axis=0)[12, 24:28, 0]
+    got = wgmb.Blur("gather")(frame_of([rolling(t) for t in (0, -1, 1)]))[12, 24:28, 0]
+    assert abs(got - truth).max() < 0.1
+
+
 def pan(t):
     """A pattern that enters from the left and from above."""
     y, x = np.mgrid[:64, :96] + 0.5

@@ -566,6 +566,10 @@ def instant(layers, tiles, pixel, t, color, sample, edge):
     is_inside = (at >= 0).all() and (at < size).all()
     if is_inside and miss > 8:
         return None
+    if is_inside:  # its surface goes on behind something nearer
+        z = layers[0].depth[0]
+        if z[int(at[1]), int(at[0])] * 1.05 < z[y, x]:
+            return color[y, x]
     return bilinear(color, *(at if is_inside else at_border(at, size, n)))
 
 
@@ -625,7 +629,8 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             found = Sample(z * weight, z, residual, at, f, back, pixel)
             is_opaque = back or frame.edgeless[pixel]
             again = f > 0 and not is_opaque and seen[1].frame == 0
-            if not (f in far or again) or is_hidden(layers[0], frame, found):
+            covered = f > 0 and is_covered(layers[0], x, y, found.true_depth, t)
+            if not covered and (not (f in far or again) or is_hidden(layers[0], frame, found)):
                 record(seen, found, is_opaque)
         return d if is_there else np.full(2, np.inf), is_there
 
@@ -678,6 +683,17 @@ def is_hidden(own, frame, found):
     if not (0 <= here[0] < width and 0 <= here[1] < height):
         return True
     return own.depth[0][int(here[1]), int(here[0])] * 1.05 < found.true_depth
+
+
+def is_covered(own, x, y, z, t):
+    """True if the own surface of a pixel, before the depth z, goes on behind something nearer."""
+    layer = int(0 < own.depth[1][y, x] * 1.3 < z)
+    step = moved(own.trajectory[layer][y, x], t)
+    i, j = np.floor(np.array([x, y]) + 0.5 - step).astype(int)
+    is_inside = 0 <= i < own.depth[0].shape[1] and 0 <= j < own.depth[0].shape[0]
+    if not is_inside or abs(t) >= 0.25 or np.hypot(*step) >= 5:
+        return False
+    return own.depth[0][j, i] * 1.3 < own.depth[layer][y, x] < z / 1.3
 
 
 def iterate_fixed_point(paths, centre, seed, u, first):
@@ -761,7 +777,7 @@ def fetch(frame, s, edge):
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
             if s.back and behind:
                 color, cover = color + share * frame.color[1][p], cover + share
-            elif s.true_depth / 1.25 <= z <= 1.25 * s.true_depth:
+            elif s.true_depth / 1.3 <= z <= 1.3 * s.true_depth:
                 color = color + share * frame.color[0][p]
                 cover += share * (1.0 if s.back else frame.coverage[p])
     if s.back and cover > 1e-4:

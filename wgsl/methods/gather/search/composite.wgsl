@@ -12,7 +12,6 @@
 override WEIGHTED: bool = false;    // pixels have weights
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
-const TEXEL_DEPTH_RATIO: f32 = 1.25;   // of a texel of a surface to its sample: at outlines, round bodies fall away steeply
 const EDGE_WIDTH: f32 = 0.5;            // of edges between two texels, as a share of the motion from sample to sample,
 const LEAST_WIDTH: f32 = 0.667;         // and at least [px]; at 1, they are bilinear
 
@@ -115,8 +114,8 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, width: f32) 
     let from_back = is_back && matte.has_back;
     let z = matte.depth;
     // What lies as deep, and of a back layer the other back layers. What lies before it is composited by itself.
-    let is_beyond = z > sample.true_depth * TEXEL_DEPTH_RATIO;
-    let is_before = z < sample.true_depth / TEXEL_DEPTH_RATIO;
+    let is_beyond = z > sample.true_depth * BODY_DEPTH_RATIO;
+    let is_before = z < sample.true_depth / BODY_DEPTH_RATIO;
     let belongs = from_back || !(is_beyond || is_before);
     let amount = select(0.0, shares.x * shares.y, belongs);
     (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);

@@ -58,7 +58,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     if k >= worklist.count || any(id >= frame.size) { return; }
     let pixel = pixel_at(id);
     let front = 0u;
-    let starts = Starts(pixel.trajectory, surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u), surface_at(id, 5u));
+    let starts = Starts(pixel.trajectory, surface_at(id, 0u), surface_at(id, 1u), surface_at(id, 2u), surface_at(id, 3u),
+                        surface_at(id, 4u), surface_at(id, 5u));
     let block_trajectory = unpack_trajectory(surface_of(vec2i(pixel.block * BLOCK), front));  // as classified
     let is_static = is_static_pixel(pixel);
     let samples = select(pixel.times.count, 0u, is_static);
@@ -171,9 +172,11 @@ fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, st
     add_unresolved(exposure, times.first, unresolved, far, pixel);
 }
 
-/// Add the times at which no frame shows anything: a tap along the pixel's own trajectory; where no search came near, hidden.
+/// Add the times at which no frame shows anything: a tap along the pixel's own trajectory; of the pixel itself, where its surface goes on
+/// behind something nearer; where no search came near, hidden.
 fn add_unresolved(exposure: ptr<function, Exposure>, first: u32, bits: u32, far: u32, pixel: Pixel) {
     var todo = bits;
+    let z = abs(unpack_depth(surface_of(vec2i(pixel.x), 0u)));
     loop {
         if todo != 0u {
             let t = time_in(pixel.times, first, todo);
@@ -182,7 +185,8 @@ fn add_unresolved(exposure: ptr<function, Exposure>, first: u32, bits: u32, far:
             if is_far && is_inside(p) {
                 (*exposure).hidden += 1.0;
             } else {
-                let at = at_border(p, first + firstTrailingBit(todo));
+                let is_behind = abs(unpack_depth(surface_of(vec2i(nearest_pixel(p)), 0u))) * SURFACE_DEPTH_RATIO < z && is_inside(p);
+                let at = select(at_border(p, first + firstTrailingBit(todo)), pixel.x, is_behind);
                 var one = tap(at);
                 if MOVING_LIGHT { one.color += moving_light(at, 0u, t, duration_in(pixel.times, first, todo)); }
                 add_time(exposure, one, pixel.share);

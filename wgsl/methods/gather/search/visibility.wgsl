@@ -10,6 +10,8 @@ const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a
 const SCATTERED: u32 = 16u;             // bit of what is scattered among the pending starts
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
+const BODY_DEPTH_RATIO: f32 = 1.3;      // of depths close together on one body: at outlines, round ones fall away steeply
+const GOES_ON: f32 = 5.0;               // how far a surface is taken to go on behind something nearer [px]
 
 struct Sample {
     depth: f32,         // biased, for comparisons
@@ -19,11 +21,18 @@ struct Sample {
     layer: u32,         // of `surfaces`
 }
 
+struct Cover {          // what a pixel's own layer may hide of other frames
+    z: f32,             // its depth, 0 if there is none
+    goes_on: bool,      // it is still there
+}
+
 struct Visible {        // the nearest samples of each kind
     opaque: Sample,
     front_edge: Sample,
     back_edge: Sample,  // behind the front edge
     miss2: f32,         // least squared distance from the pixel at which a front layer's first search ended [px^2]
+    front_cover: Cover, // of the pixel's own layers
+    back_cover: Cover,
 }
 
 // The layers are searched in this order, each only if it may add anything: see next_search().
@@ -41,7 +50,9 @@ const SEARCHES: u32 = 8u;
 fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
                       a: Candidates, b: Candidates, c: Candidates) -> Visible {
     let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
-    var visible = Visible(nothing(), nothing(), nothing(), INFINITE);
+    let front_cover = cover_at(x, starts.own_front, abs(unpack_depth(starts.own_front)), t);
+    let back_cover = cover_at(x, starts.own_back, back_depth_in(starts.own_back.w), t);
+    var visible = Visible(nothing(), nothing(), nothing(), INFINITE, front_cover, back_cover);
     var hidden = false;             // the front layer of the frame itself shows nothing opaque
     var search = OWN_FRONT;
     loop {
@@ -87,7 +98,9 @@ struct Query {          // what is searched, and where
 
 struct Starts {         // whose trajectories the first searches of a pixel start from, read once
     own: Trajectory5,
-    front1: vec4u,      // what is at the pixel's place in the layers of neighbouring frames, see pack_surface()
+    own_front: vec4u,   // what is at the pixel's place in the frame's own layers, see pack_surface()
+    own_back: vec4u,
+    front1: vec4u,      // and in those of neighbouring frames
     back1: vec4u,
     front2: vec4u,
     back2: vec4u,
@@ -198,7 +211,8 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
     // A silhouette of the frame's own is not found once more a frame interval away, where paths that bend are off.
     let is_again = query.layer > 1u && z < 0.0 && (*visible).front_edge.layer < 2u;
-    let counts = !(is_far(query.layer) || is_again) || is_hidden(found);
+    let is_still_covered = query.layer > 1u && is_covered((*visible).front_cover, (*visible).back_cover, found.true_depth);
+    let counts = !is_still_covered && (!(is_far(query.layer) || is_again) || is_hidden(found));
     if counts && z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
     if counts && z < 0.0 {
         let front_edge = (*visible).front_edge;
@@ -226,6 +240,21 @@ fn is_complement(found: Sample) -> bool {
     if found.layer != OWN_BACK { return false; }
     let front = surface_of(vec2i(nearest_pixel(found.at)), OWN_FRONT).w;
     return (front & (SINGLE | BY_COLOR)) == BY_COLOR;
+}
+
+/// A pixel's own surface at depth `z` by the time `t`: where what is at the pixel then is behind something nearer in the frame, nobody
+/// sees if the surface has ended, and it is taken to go on, near the frame's own instant and place.
+fn cover_at(x: vec2f, surface: vec4u, z: f32, t: f32) -> Cover {
+    let at = x - displacement_of(surface, t);
+    let nearer = abs(unpack_depth(surface_of(vec2i(nearest_pixel(at)), 0u)));
+    let is_near = abs(t) < TRUSTED_TIME && distance(at, x) < GOES_ON && is_inside(at);
+    return Cover(z, is_near && nearer * BODY_DEPTH_RATIO < z);
+}
+
+/// True if a sample of another frame at the depth `z` is behind a pixel's own surface that goes on: behind the back if it is before it.
+fn is_covered(front: Cover, back: Cover, z: f32) -> bool {
+    let by_back = back.z > 0.0 && back.z * BODY_DEPTH_RATIO < z;
+    return select(front.goes_on && front.z * BODY_DEPTH_RATIO < z, back.goes_on, by_back);
 }
 
 fn nothing() -> Sample {
