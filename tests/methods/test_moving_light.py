@@ -69,6 +69,24 @@ def behind_a_body(t):
     return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
 
 
+def between_bodies(t):
+    """A shadow that goes to the right with a body far above it, behind one that goes to the left.
+
+    In either neighbour one of the two bodies hides the ground that is in the shadow.
+    """
+    x, y = twin.centres(SIZE)
+    low = (np.abs(x - 42 + 22 * t) < 12) & (np.abs(y - 30) < 11)
+    high = (np.abs(x - 24 - 22 * t) < 9) & (np.abs(y - 12) < 6)
+    far = np.maximum(np.abs(x - 24 - 22 * t) - 9, np.abs(y - 30) - 6)
+    body = low | high
+    light = np.where(body, 0.8, 1 - 0.8 / (1 + np.exp(3 * far)))[..., None] * np.ones(3)
+    albedo = np.where(body[..., None], 0.3, ground(x, y))
+    motion = np.where(low[..., None], (22.0, 0, -22, 0), high[..., None] * [-22.0, 0, 22, 0])
+    given = {"color": albedo * light, "diffuse_light": light, "diffuse_color": albedo,
+             "motion": motion, "depth": np.where(low, 4.0, np.where(high, 5, 7))}  # fmt: skip
+    return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
+
+
 def around(**how):
     """The frame between its neighbours."""
     return scene(0, **how).between(scene(-1, **how), scene(1, **how))
@@ -284,22 +302,35 @@ def test_trust_is_its_twin(stages, close):
             close(ahead[..., :2], twin.filled(raw, sure, own), 0.05)
 
 
-def test_what_is_extrapolated_is_its_twin(device, close):
-    """Half of the shadow is hidden in the next frame: the previous one and the body tell of it."""
-    stages = Stages(device, False, behind_a_body(0).between(behind_a_body(-1), behind_a_body(1)))
+@pytest.mark.parametrize("scene", [behind_a_body, between_bodies])
+def test_what_is_extrapolated_is_its_twin(device, close, scene):
+    """Half of the shadow is hidden in the next frame: the previous one and bodies tell of it."""
+    stages = Stages(device, False, scene(0).between(scene(-1), scene(1)))
     own, frame = stages["values 0"][..., 3], stages.frames[0]
     near = stages.tiles(4)
     depth, motion = frame["depth"], frame["motion"].astype(float)
-    bodies = twin.bodies(depth, motion)
-    cells = near[::4, ::4]
-    close(stages["bodies"], np.where(cells[..., None], bodies, 0), 2e-3)
+    cells = near[::4, ::4][..., None]
+    found = twin.bodies(depth, motion)
+    for one, name in zip(found, ("nearest bodies", "other bodies"), strict=True):
+        close(stages[name], np.where(cells, one, 0), 2e-3)
+    motions = twin.motions_of(found)
+    assert found[1].any() == (scene is between_bodies)
+    sides = {}
+    for side in (-1, 1):
+        seen, other = stages[f"changes {side}"][..., 3] > 0, stages[f"values {side}"][..., 3]
+        sides[side] = twin.compared(motions, own, other, depth, seen, side, near)
+        differs = np.abs(sides[side] - stages[f"bodies {side}"])[cells[..., 0]]
+        assert np.mean(differs > 2e-2) < 0.03  # where rounding decides what is one surface
+    bodies = stages["bodies"]
+    want = twin.chosen_body(motions, sum(stages[f"bodies {side}"] for side in (-1, 1)))
+    close(bodies, np.where(cells, want, 0), 2e-2)
     flows = {side: stages[f"flow ahead {side}"] for side in (-1, 1)}
     explained = {side: stages[f"explained {side}"] for side in (-1, 1)}
     for side in (-1, 1):
         seen, other = stages[f"changes {side}"][..., 3] > 0, stages[f"values {side}"][..., 3]
         back, body = stages[f"flow back {side}"][..., :2], twin.body_at(bodies, side, SIZE)
         want = twin.explained(
-            flows[side][..., :2], back, own, other, flows[-side], body, depth, seen
+            flows[side][..., :2], back, own, other, flows[-side], body, depth, seen, near
         )
         differs = np.abs(want - explained[side])[near[::2, ::2]]
         assert np.mean(differs > 5e-3) < 0.03  # where rounding decides what is one surface
@@ -309,6 +340,10 @@ def test_what_is_extrapolated_is_its_twin(device, close):
         want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
         differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
         assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
+        reached = twin.carried(own, stages[f"settled {side}"], max(stages.times))
+        reached &= stages.found[1:].reshape(reached.shape) & 4 != 0
+        assert reached.any()
+        assert (stages.found[1:].reshape(reached.shape)[reached] & 2 != 0).all()
     for i, time in list(enumerate(stages.times))[::3]:
         change, _ = change_by_twin(stages, time)
         want = twin.added(change, frame["light"], stages.albedo)
@@ -333,8 +368,10 @@ def change_by_twin(stages, time):
         b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
         explains = flows[0][..., 3]
         change, trusted = twin.from_pushed(a, b, own, other, trusts, explains, share)
+    hidden = np.any([stages[f"changes {i}"][..., 3] == 0 for i in (-1, 1)], axis=0)
+    hidden &= not stages.pulled
     sure = twin.sure(own, other, flows, trusted, stages.pulled)
-    return twin.clamped(change, before, after), sure
+    return twin.clamped(change, before, after, hidden, own), sure
 
 
 def test_what_is_added_is_its_twin(stages, close):
@@ -411,6 +448,27 @@ def test_a_shadow_is_followed_to_where_a_body_hides_it():
         for s in ("off", "auto")
     )
     assert on < 0.5 * off
+
+
+@pytest.mark.covers(0)
+@pytest.mark.parametrize("at", ["start", "end"])
+def test_a_shadow_goes_with_its_body_where_others_hide_the_ground(at):
+    """The nearest body goes the other way, and one of the neighbours shows nothing there."""
+    shutter = Shutter(180, at)
+    frame = between_bodies(0).between(between_bodies(-1), between_bodies(1))
+    times = shutter.sample_times(64).astype(float)
+    want = np.mean([between_bodies(t).color for t in times], 0)
+    shown = slice(22, 38), slice(8, 30)
+    off, on = (
+        np.sqrt(
+            np.mean(
+                (Blur("gather", shutter=shutter, shading=s)(frame)[shown][..., :3] - want[shown])
+                ** 2
+            )
+        )
+        for s in ("off", "auto")
+    )
+    assert on < 0.75 * off
 
 
 def test_one_neighbour_is_followed_on_its_side():

@@ -275,18 +275,21 @@ def slopes(inverse):
     return found
 
 
-def on_one_surface(flow, depth):
-    """True where the flow leads to a pixel near the tangent plane, and the way back too."""
+def on_one_surface(flow, depth, at=None):
+    """True where the flow leads to a pixel near the tangent plane, and the way back too.
+
+    `at`: rows and columns of the pixels, of which `flow` is; all by default.
+    """
     height, width = depth.shape
     inverse = 1 / depth
     across, down = slopes(inverse)
-    y, x = np.mgrid[:height, :width]
+    y, x = at = tuple(np.mgrid[:height, :width]) if at is None else at
     i, j = (np.floor(n + 0.5 + flow[..., k]).astype(int) for k, n in enumerate((x, y)))
     there = np.clip(j, 0, height - 1), np.clip(i, 0, width - 1)
     most = 1.02 + 0.5 * np.hypot(i - x, j - y) / width
     expected = (
-        (inverse + (i - x) * across + (j - y) * down, inverse[there]),
-        (inverse[there] - (i - x) * across[there] - (j - y) * down[there], inverse),
+        (inverse[at] + (i - x) * across[at] + (j - y) * down[at], inverse[there]),
+        (inverse[there] - (i - x) * across[there] - (j - y) * down[there], inverse[at]),
     )
     return np.all([np.maximum(a, b) < most * np.minimum(a, b) for a, b in expected], axis=0)
 
@@ -318,23 +321,83 @@ def filled(flow, trusted, own):
 
 
 def bodies(depth, motion):
-    """The motion of the nearest body before cells of 4 x 4 pixels, relative to what is there."""
+    """The motions of two bodies before cells of 4 x 4 pixels, relative to what is there.
+
+    Those of the nearest body, and of the nearest one that moves otherwise.
+    """
     height, width = depth.shape
-    found = np.zeros((-(-height // 4), -(-width // 4), 4))
-    for j, i in np.ndindex(*found.shape[:2]):
-        y, x = min(4 * j + 2, height - 1), min(4 * i + 2, width - 1)
-        for ring in range(6):
-            least, reach = depth[y, x] / 1.02, 3 * 1.6**ring
+    found = np.zeros((2, -(-height // 4), -(-width // 4), 4))
+
+    def longest(both):
+        return max(np.hypot(*both[:2]), np.hypot(*both[2:]))
+
+    for j, i in np.ndindex(*found.shape[1:3]):
+        y, x = _middle(j, i, depth.shape)
+        nearest, other = found[:, j, i]
+        for ring in range(8):
+            least, before, reach = depth[y, x] / 1.02, nearest.copy(), 3 * 1.6**ring
             for angle in 2 * np.pi * np.arange(12) / 12:
-                row = min(max(y + round(reach * np.sin(angle)), 0), height - 1)
-                column = min(max(x + round(reach * np.cos(angle)), 0), width - 1)
-                apart = motion[row, column] - motion[y, x]
-                moves = max(np.hypot(*apart[:2]), np.hypot(*apart[2:])) > 1
-                if moves and depth[row, column] < least:
-                    least, found[j, i] = depth[row, column], apart
-            if found[j, i].any():
+                apart, past = (
+                    motion[_place(y, x, far, angle, depth.shape)] - motion[y, x]
+                    for far in (reach, reach + 2)
+                )
+                z = depth[_place(y, x, reach, angle, depth.shape)]
+                alike = longest(past - apart) <= 0.5 + 0.05 * np.linalg.norm(apart)
+                if longest(apart) <= 1 or not alike or z >= least:
+                    continue
+                if not before.any():
+                    least, nearest[:] = z, apart
+                elif longest(apart - before) > 0.5 * np.linalg.norm(before):
+                    least, other[:] = z, apart
+            if other.any():
                 break
     return found
+
+
+def _middle(row, column, size):
+    """The pixel that stands for a cell."""
+    return min(4 * row + 2, size[0] - 1), min(4 * column + 2, size[1] - 1)
+
+
+def _place(y, x, far, angle, size):
+    row, column = y + round(far * np.sin(angle)), x + round(far * np.cos(angle))
+    return min(max(row, 0), size[0] - 1), min(max(column, 0), size[1] - 1)
+
+
+def motions_of(found):
+    """Motions that the shadow in a cell may have: of each body, and less of it."""
+    return np.stack([share * one for one in found for share in (1, 0.88)])
+
+
+def compared(motions, own, other, depth, seen, side, known):
+    """Differences around each cell with each of its motions, at 5 x 5 places."""
+    rows, columns = np.mgrid[: motions.shape[1], : motions.shape[2]]
+    y, x = (
+        np.minimum(4 * n + 2, size - 1) for n, size in zip((rows, columns), own.shape, strict=True)
+    )
+    ways = motions[..., 2:] if side > 0 else motions[..., :2]
+    out = np.zeros((*y.shape, len(motions)))
+    for b, a in np.ndindex(5, 5):
+        place = (
+            np.clip(y + 5 * (b - 2), 0, own.shape[0] - 1),
+            np.clip(x + 5 * (a - 2), 0, own.shape[1] - 1),
+        )
+        to = np.dstack([place[1] - x, place[0] - y])
+        same = on_one_surface(to, depth, (y, x))
+        for n, way in enumerate(ways):
+            differs = differs_by(way, -way, own, other, depth, seen, 0.3, known, place)
+            out[..., n] += np.where(same & motions[n].any(axis=2), differs, 0)
+    return out
+
+
+def chosen_body(motions, differs):
+    """The motion with which the least differs, from both neighbours together."""
+    best, least = motions[0], differs[..., 0]
+    for k in range(1, len(motions)):
+        better = motions[k].any(axis=2) & (differs[..., k] < 0.95 * least)
+        best = np.where(better[..., None], motions[k], best)
+        least = np.where(better, differs[..., k], least)
+    return best
 
 
 def body_at(found, side, size):
@@ -343,45 +406,55 @@ def body_at(found, side, size):
     return np.repeat(np.repeat(way, 4, 0), 4, 1)[: size[0], : size[1]]
 
 
-def differs_by(to, was, own, other, depth, seen, hidden):
+def stays(own, other, seen):
+    """Differences without motion; where the neighbour does not show the surface, all that is."""
+    return np.where(seen, np.abs(other - own), own)
+
+
+def differs_by(to, was, own, other, depth, seen, hidden, known, at=None):
     """Differences of the frame from the neighbour at x + to, and of that from the frame at x + was.
 
-    Each is `hidden` where a body hides it. `seen`: where the neighbour shows the surface.
+    Where one of them is not seen, that without motion; where a body hides it, the share `hidden` of
+    that. `seen`: where the neighbour shows the surface; `known`: near changes of light. `at`: see
+    on_one_surface.
     """
-    x, y = centres(own.shape)
-    there = sampled(other, x + to[..., 0], y + to[..., 1])
-    here = sampled(own, x + was[..., 0], y + was[..., 1])
-    landing = seen[nearest(x + to[..., 0], y + to[..., 1])]
-    is_there, is_here = on_one_surface(to, depth) & landing, on_one_surface(was, depth) & seen
-    return np.where(is_there, np.abs(there - own), hidden) + np.where(
-        is_here, np.abs(here - other), hidden
-    )
+    rows, columns = at = tuple(np.mgrid[: own.shape[0], : own.shape[1]]) if at is None else at
+    still = stays(own, other, seen)[at]
+    total = 0.0
+    for way, image, mine, shown in ((to, other, own, None), (was, own, other, seen[at])):
+        x, y = columns + 0.5 + way[..., 0], rows + 0.5 + way[..., 1]
+        landing = nearest(x, y, own.shape)
+        same = on_one_surface(way, depth, at)
+        compares = same & (seen[landing] if shown is None else shown)
+        before = known[landing] & (depth[at] > 1.02 * depth[landing])
+        unseen = still * np.where(same | before, hidden, 1)
+        total = total + np.where(compares, np.abs(sampled(image, x, y) - mine[at]), unseen)
+    return total
 
 
-def explained(flow, back, own, other, flow_other, body, depth, seen):
+def explained(flow, back, own, other, flow_other, body, depth, seen, known):
     """Differences with the flow, without, with the other neighbour's and the body's; half size.
 
     `flow_other`: with its trust.
     """
     x, y = centres(own.shape)
-    ahead = sampled(other, x + flow[..., 0], y + flow[..., 1])
-    behind = sampled(own, x + back[..., 0], y + back[..., 1])
-    with_ = np.abs(ahead - own) + np.abs(behind - other)
-    still = np.abs(other - own)
+    unsure = np.where(seen, 1, 0.3)
+    with_ = differs_by(flow, back, own, other, depth, seen, unsure, known)
+    still = unsure * stays(own, other, seen)
     way, trusted = flow_other[..., :2], flow_other[..., 2]
     was = way
     for _ in range(2):
-        was = way[nearest(x + was[..., 0], y + was[..., 1])]
-    turned = differs_by(-way, was, own, other, depth, seen, 0)
+        was = way[nearest(x + was[..., 0], y + was[..., 1], own.shape)]
+    turned = differs_by(-way, was, own, other, depth, seen, 0, known)
     turned = with_ * (1 - trusted) + turned * trusted
-    as_body = differs_by(body, -body, own, other, depth, seen, still)
+    as_body = differs_by(body, -body, own, other, depth, seen, 0.3, known)
     as_body = np.where(body.any(axis=2), as_body, with_)
     return blurred(np.dstack([with_, 2 * still, turned, as_body]), 4.0)
 
 
-def nearest(x, y):
-    """Rows and columns of the pixels at these places of an image of the size of `x`."""
-    height, width = x.shape
+def nearest(x, y, size):
+    """Rows and columns of the pixels at these places of an image; `size`: height, width."""
+    height, width = size
     rows, columns = (np.floor(n).astype(int) for n in (y, x))
     return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
 
@@ -398,14 +471,13 @@ def chosen(flow, flow_other, body, around, around_other):
     around, around_other = (doubled(a, flow.shape[:2]) for a in (around, around_other))
     with_, still, turned, as_body = np.moveaxis(around, 2, 0)
     best = np.dstack([flow[..., :3], share(with_, still)])
-    least = with_
     other = share(turned, still) * share(around_other[..., 0], around_other[..., 1])
-    better = (flow_other[..., 2] * other > best[..., 2] * best[..., 3]) & (turned < 0.75 * least)
+    better = (flow_other[..., 2] * other > best[..., 2] * best[..., 3]) & (turned < 0.75 * with_)
     best = np.where(better[..., None], np.dstack([-flow_other[..., :3], other]), best)
-    least = np.where(better, turned, least)
+    with_, still, _, as_body = np.moveaxis(around + around_other, 2, 0)
     explains = share(as_body, still)
-    better = body.any(axis=2) & (explains > np.maximum(np.abs(best[..., 2]) * best[..., 3], 0.75))
-    better &= as_body < 0.75 * least
+    better = body.any(axis=2) & (as_body < 0.83 * with_)
+    better &= explains > np.maximum(flow[..., 2] * share(with_, still), 0.5)
     minus = np.full(explains.shape, -1.0)
     return np.where(better[..., None], np.dstack([body, minus, explains]), best)
 
@@ -423,10 +495,10 @@ def settled(found, own, other, depth, seen):
     way = around[..., :2] / np.maximum(share, 1e-4)[..., None]
     x, y = centres(own.shape)
     x, y = x + way[..., 0], y + way[..., 1]
-    is_there = on_one_surface(way, depth) & seen[nearest(x, y)]
+    is_there = on_one_surface(way, depth) & seen[nearest(x, y, own.shape)]
     differs = np.abs(sampled(other, x, y) - own)
     fits = np.where(is_there, 1 - np.minimum(differs / 0.3, 1), 1)
-    keep = np.maximum(trusted * explains, 1 - fits)[..., None]
+    keep = np.where(found[..., 2] < 0, 0, np.maximum(trusted * explains, 1 - fits))[..., None]
     flow = way * (1 - keep)
     flow = flow + found[..., :2] * keep
     trust = 1 - keep[..., 0] + trusted * keep[..., 0]
@@ -515,13 +587,35 @@ def pulled(own, other, flows, trusts, time):
     return come * (trusted / np.maximum(total, 1e-3))[..., None], trusted
 
 
-def clamped(change, before, after):
-    """No more than a frame showed around."""
+def clamped(change, before, after, hidden, own):
+    """No more than a frame showed around; where one `hidden` there does not show it, no light.
+
+    `own`: the darkness of the frame. There small changes are noise.
+    """
     low, high = np.minimum(0, np.minimum(before, after)), np.maximum(0, np.maximum(before, after))
     near = [(i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)]
     low = np.min([shifted(low, *by) for by in near], 0)
     high = np.max([shifted(high, *by) for by in near], 0)
-    return np.clip(change, low, high)
+    hidden = np.any([shifted(hidden, *by) for by in near], 0)
+    result = np.clip(change, low, high)
+    free = np.clip(change, -3, -np.log(np.maximum(1 - own[..., :3], 0.005)))
+    u = np.clip((np.abs(free).max(2) - 0.1) / 0.2, 0, 1) * hidden
+    u = (u * u * (3 - 2 * u))[..., None]
+    return result * (1 - u) + free * u
+
+
+def carried(own, flow, last):
+    """Tiles of 16 x 16 pixels that shadows come to with the motion of a body; own: how dark."""
+    height, width = own.shape
+    tiles = np.zeros((-(-height // 16), -(-width // 16)), bool)
+    for y, x in np.ndindex(height // 2, width // 2):
+        way = last * flow[2 * y, 2 * x, :2]
+        if flow[2 * y, 2 * x, 3] < 0 and own[2 * y, 2 * x] > 0.3 and np.hypot(*way) > 0.5:
+            for share in (0, 1 / 3, 2 / 3, 1):
+                i, j = 2 * x + 0.5 + share * way[0], 2 * y + 0.5 + share * way[1]
+                if 0 <= i < width and 0 <= j < height:
+                    tiles[int(j // 16), int(i // 16)] = True
+    return tiles
 
 
 def sure(own, other, flows, trusted, pulled=False):

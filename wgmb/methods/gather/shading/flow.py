@@ -109,24 +109,34 @@ def _extrapolated(
     surfaces: Mapping[str, View],
 ) -> dict[int, View]:
     """Flow to each neighbour, not as searched where the other one or a body explains more."""
-    none = stage.none("rgba16float")
-    bodies = stage.sparse("bodies", "rgba16float", grid_of_cells(stage.size))
+    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
+    cells = grid_of_cells(stage.size)
+    nearest, others, bodies = (
+        stage.sparse(name, "rgba16float", cells)
+        for name in ("nearest bodies", "other bodies", "bodies")
+    )
 
     def run(entry: str, side: int, **bindings: Any) -> None:
         way, other = searched[side], searched.get(-side)
         given: dict[str, Any] = {
             "values": values[0], "values_there": values[side], "change": changed[side],
             "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
-            "bodies": bodies, "around": wide, "around_other": wide,
-            "flow_out": stage.unused("rgba16float"), "bodies_out": stage.unused("rgba16float"),
+            "bodies": bodies, "others": none, "around": wide, "around_other": wide,
+            "flow_out": spare, "bodies_out": spare, "others_out": spare,
             "weighted": stage.unused("rgba32float"), **surfaces,
         }  # fmt: skip
         stage.run(
             "extrapolate", entry, over="near", constants={"NEXT": side > 0}, **given | bindings
         )
 
-    wide = stage.none("rgba32float")
-    run("find_bodies", next(iter(searched)), halved=True, bodies=none, bodies_out=bodies)
+    spare, one = stage.unused("rgba16float"), next(iter(searched))
+    run("find_bodies", one, halved=True, bodies=none, bodies_out=nearest, others_out=others)
+    found: dict[str, Any] = {"halved": True, "bodies": nearest, "others": others}
+    differs = {side: stage.sparse(f"bodies {side}", "rgba32float", cells) for side in searched}
+    for side in searched:
+        run("compare_bodies", side, **found, weighted=differs[side])
+    run("choose_body", one, **found, around=differs[one], around_other=differs.get(-one, wide),
+        bodies_out=bodies)  # fmt: skip
     around, result = {}, {}
     weighted = stage.sparse("weighted", "rgba32float")
     for side in searched:

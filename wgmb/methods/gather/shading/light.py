@@ -149,6 +149,8 @@ class MovingLight:
             "motion": kind.frames[0].motion,
         }
         found = flows(stage, seen, changed, surfaces)
+        if not stage.pulled:
+            _carry(stage, present[0], found, times)
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
         )
@@ -212,6 +214,22 @@ class MovingLight:
         return self._images.view_of(
             texture, dimension="2d", base_array_layer=index, array_layer_count=1
         )
+
+
+def _carry(stage: Stage, darkness: View, ways: Mapping[int, LightFlow], times: LightTimes) -> None:
+    """Record which tiles bodies carry their shadows into: they are added to those that change."""
+    for side, way in ways.items():
+        stage.run(
+            "carry",
+            over="near",
+            halved=True,
+            carry=stage.uniform("carry", "Carry", last=max(0.0, *(side * time for time in times))),
+            values=darkness,
+            flow=way.ahead,
+            changing=stage.lists["changing"],
+        )
+    lists: dict[str, Any] = dict(stage.lists)
+    replace(stage, gates={}).run("near", "size_lists", size=(1, 1), **lists)
 
 
 def _tile_grid(size: tuple[int, int]) -> tuple[int, int]:

@@ -16,6 +16,11 @@ fn light_tile(px: vec2u) -> u32 {
     return px.y / LIGHT_TILE * across + px.x / LIGHT_TILE;
 }
 
+struct FoundTiles {
+    any: atomic<u32>,   // 1 if light changes anywhere
+    tiles: array<atomic<u32>>,
+}
+
 // A list of tiles: workgroups of an indirect dispatch over their pixels, WG_X * WG_Y each; the number of tiles; workgroups of
 // one over an image of half the size or less, one a tile; a word that is free; the tiles.
 const TILE_GROUPS = LIGHT_TILE * LIGHT_TILE / (WG_X * WG_Y);   // of a tile
@@ -23,3 +28,11 @@ const LIGHT_GROUPS_PER_ROW: u32 = 32768u;     // of a dispatch; devices take 65,
 const LISTED: u32 = 3u;         // word of the number
 const HALVED: u32 = 4u;         // first word of the workgroups for the smaller image
 const FIRST_LISTED: u32 = 8u;
+
+struct TileList {
+    groups: vec3u,
+    count: atomic<u32>,
+    halved: vec3u,
+    free: u32,
+    tiles: array<u32>,
+}

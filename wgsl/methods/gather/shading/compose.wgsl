@@ -16,7 +16,7 @@ struct Node {
 @group(1) @binding(4) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
 @group(1) @binding(5) var after: texture_2d<f32>;       // stored as rgba16float
 @group(1) @binding(11) var earlier: texture_2d<f32>;    // stored as rgba16float: what is added for other reasons
-@group(1) @binding(12) var range: texture_2d<u32>;      // stored as rgba32uint, by `find_range`: the least and the greatest change around
+@group(1) @binding(12) var range: texture_2d<u32>;      // stored as rgba32uint, by `find_range`: the least and the greatest change around, and 1 if a neighbour does not show all of it
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
 @group(1) @binding(15) var added: Added;                // [linear, premultiplied by weight]; a: how sure it is, 0 to 1
@@ -33,6 +33,7 @@ override TOLD: bool = true;         // how sure it is
 const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
 const MOST_CLOSED: f32 = 2.0;       // factor of what covers a part of a pixel where flow is not searched
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
+const DARKEST: f32 = -3.0;       // change of the logarithm of light where a neighbour does not show it
 const MOST_ADDED: f32 = 60000.0;    // [linear]
 const COUNTS: f32 = 0.1;            // change of the logarithm of light from which on it has to be followed
 
@@ -48,14 +49,16 @@ fn find_range(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id
     if any(id >= frame.size) { return; }
     var low = vec3f(0.0);
     var high = vec3f(0.0);
+    var is_hidden = false;      // in a neighbour
     for (var k = 0; k < 9; k++) {
         let near = inside(vec2i(id) + vec2i(k % 3, k / 3) - 1);
-        let a = textureLoad(before, near, 0).rgb;
-        let b = textureLoad(after, near, 0).rgb;
-        low = min(low, min(a, b));
-        high = max(high, max(a, b));
+        let a = textureLoad(before, near, 0);
+        let b = textureLoad(after, near, 0);
+        low = min(low, min(a.rgb, b.rgb));
+        high = max(high, max(a.rgb, b.rgb));
+        is_hidden = is_hidden || (a.a == 0.0 && textureDimensions(before).x > 1u) || (b.a == 0.0 && textureDimensions(after).x > 1u);
     }
-    textureStore(range_out, id, vec4u(pack2x16float(low.rg), pack2x16float(vec2f(low.b, high.r)), pack2x16float(high.gb), 0u));
+    textureStore(range_out, id, vec4u(pack2x16float(low.rg), pack2x16float(vec2f(low.b, high.r)), pack2x16float(high.gb), u32(is_hidden)));
 }
 
 /// Nothing yet: light rests where it changes in no frame, and that is sure. It is read in tiles with changes, and in those beside them.
@@ -78,7 +81,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     store(px, change.rgb, as_sure_as(px, change.a));
 }
 
-/// The change of the logarithm of light: no more than a frame showed around; a: how sure it is, 1 where nothing changes.
+/// The change of the logarithm of light: no more than a frame showed around, where all show it; a: how sure it is, 1 where nothing changes.
 fn moved(px: vec2i) -> vec4f {
     var change = vec4f(0.0);
     if PULLED { change = pulled(px); } else { change = pushed(px); }
@@ -88,7 +91,13 @@ fn moved(px: vec2i) -> vec4f {
     let high = vec3f(middle.y, unpack2x16float(packed.z));
     var certain = 1.0;
     if TOLD { certain = sure(px, change.a); }
-    return vec4f(clamp(change.rgb, low, high), certain);
+    var most = clamp(change.rgb, low, high);
+    if !PULLED && packed.w == 1u {      // noise is no shadow
+        let darkness = textureLoad(values, px, 0).rgb;
+        let any_light = clamp(change.rgb, vec3f(DARKEST), -log(max(1.0 - darkness, vec3f(LEAST_LIGHT))));
+        most = mix(most, any_light, smoothstep(COUNTS, 3.0 * COUNTS, most_of(any_light)));
+    }
+    return vec4f(most, certain);
 }
 
 /// Confidence of the light, for flow of the trust `trusted`: the share of the change between both frames that the flow

@@ -1,6 +1,6 @@
 // What the flow to a neighbour explains, and flow where none can be found, as a body hides what moves: the flow to the other
-// neighbour, turned round, and the motion of the nearest body, which a shadow that touches it shares. They count where
-// they explain clearly more.
+// neighbour, turned round, and the motion of a body near it, which its shadow shares. They count where they explain clearly
+// more.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/listed.wgsl
@@ -9,14 +9,16 @@
 
 @group(1) @binding(0) var flow_other: texture_2d<f32>;      // stored as rgba16float: to the other neighbour; trust
 @group(1) @binding(1) var change: texture_2d<f32>;          // stored as rgba16float, by gain.wgsl; a: 1 where the neighbour shows the surface
-@group(1) @binding(2) var bodies: texture_2d<f32>;          // stored as rgba16float, by `find_bodies`
-@group(1) @binding(3) var around: texture_2d<f32>;          // stored as rgba32float: `differences` or `weighted`, blurred, at half the size
-@group(1) @binding(4) var around_other: texture_2d<f32>;    // stored as rgba32float: differences from the other neighbour
+@group(1) @binding(2) var bodies: texture_2d<f32>;          // stored as rgba16float, by `find_bodies` or `choose_body`
+@group(1) @binding(3) var around: texture_2d<f32>;          // stored as rgba32float: `weighted`, blurred, at half the size; of `choose_body`, by `compare_bodies`
+@group(1) @binding(4) var around_other: texture_2d<f32>;    // stored as rgba32float: the same from the other neighbour; 1 x 1: there is none
 @group(1) @binding(5) var flow_out: Flow;                   // flow [px], trust, how much it explains, both 0..1; of `choose` trust, of `settle` the last less than 0 where it is not searched
-@group(1) @binding(11) var weighted: Weighted;              // of `explain`: differences with flow, without, with the other's, with the body's; of `weigh`: flow times weight, weight
+@group(1) @binding(11) var weighted: Weighted;              // of `explain`: differences with flow, without, with the other's, with the body's; of `compare_bodies`: with each of the motions; of `weigh`: flow times weight, weight
 @group(1) @binding(12) var depth: texture_2d<f32>;          // stored as given
 @group(1) @binding(13) var motion: texture_2d<f32>;         // stored as given: to_prev, to_next [px]
 @group(1) @binding(14) var bodies_out: Flow;                // of cells of CELL x CELL pixels, relative to the surface: to_prev, to_next [px]; 0 where there is none
+@group(1) @binding(15) var others: texture_2d<f32>;         // stored as rgba16float, by `find_bodies`
+@group(1) @binding(16) var others_out: Flow;                // as `bodies_out`: of bodies that move otherwise
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
@@ -28,46 +30,125 @@ const MISSED: f32 = 0.85;       // share of the differences without flow from wh
 const EXPLAINED: f32 = 0.6;     // and up to which it explains them
 const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
 const SOME: f32 = 0.01;         // the same from which on it is told at all
-const SURE: f32 = 0.75;         // how much the motion of a body has to explain
+const SURE: f32 = 0.5;          // how much the motion of a body has to explain
+const BODY_CLEARLY: f32 = 0.83; // as CLEARLY, of a body
+const HIDDEN: f32 = 0.3;        // share of what differs without motion that counts where a body hides what it is compared with
 const UNLIKE: f32 = 0.3;        // difference of values from which on flow around does not fit
 const CELL: u32 = 4u;           // side [px]
-const RINGS: u32 = 6u;          // around a cell, in which bodies are looked for,
+const RINGS: u32 = 8u;          // around a cell, in which bodies are looked for,
 const FIRST_RING: f32 = 3.0;    // [px]
-const RING_GROWTH: f32 = 1.6;   // the last one is 31 px away
+const RING_GROWTH: f32 = 1.6;   // the last one is 80 px away
 const DIRECTIONS: u32 = 12u;
 const TURN: vec2f = vec2f(0.8660254, 0.5);  // cosine and sine of the angle between them
 const MOVES: f32 = 1.0;         // least motion of a body relative to the surface [px]
 const NEARER: f32 = 1.02;       // ratio of the depths of a surface and of a body before it
+const BEYOND: f32 = 2.0;        // from a pixel of a body outwards to one that moves alike [px]:
+const ALIKE: f32 = 0.5;         // motions that differ by less [px]
+const ALIKE_SHARE: f32 = 0.05;  // and this share: edges do not tell a motion, nor do bodies that spin
+const OTHERWISE: f32 = 0.5;     // share of a motion by which another one differs
+const MOTIONS: u32 = 4u;        // that a shadow may have: see `motion_of`
+const LESS: f32 = 0.88;         // share of a body's motion that its shadow may have
+const LESS_DIFFERS: f32 = 0.95; // share of the difference with a motion before it from which on a motion is better
+const PLACES: i32 = 5;          // along a side, at which a cell's motions are compared,
+const APART: i32 = 5;           // from one to the next [px]
 
-/// The motion of the nearest body before a cell's surface; of several as near, of the one with the least depth.
+/// The motion of the nearest body before a cell's surface, of several as near the one with the least depth; and that of the nearest
+/// one that moves otherwise.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_bodies(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_part(group, local, CELL);
     if any(id >= (frame.size + CELL - 1u) / CELL) { return; }
-    let px = inside(vec2i(CELL * id + CELL / 2u));
+    let px = middle_of(id);
     let own = textureLoad(motion, px, 0);
-    let z = valid_depth(textureLoad(depth, px, 0).x);
-    var found = vec4f(0.0);
+    let z = valid_depth(textureLoad(depth, px, 0).x) / NEARER;
+    var nearest = vec4f(0.0);
+    var other = vec4f(0.0);
     var reach = FIRST_RING;
     for (var ring = 0u; ring < RINGS; ring++) {
-        var least = z / NEARER;
+        let is_known = any(nearest != vec4f(0.0));
+        var found = nearest;
+        var least = z;
         var along = vec2f(1.0, 0.0);
-        let turns = select(0u, DIRECTIONS, all(found == vec4f(0.0)));
+        let turns = select(0u, DIRECTIONS, all(other == vec4f(0.0)));
         for (var k = 0u; k < turns; k++) {
             let near = inside(px + vec2i(round(reach * along)));
+            let beyond = inside(px + vec2i(round((reach + BEYOND) * along)));
             let apart = textureLoad(motion, near, 0) - own;
+            let bends = textureLoad(motion, beyond, 0) - own - apart;
             let z_near = valid_depth(textureLoad(depth, near, 0).x);
-            let is_body = max(dot(apart.xy, apart.xy), dot(apart.zw, apart.zw)) > MOVES * MOVES && z_near < least;
-            least = select(least, z_near, is_body);
-            found = select(found, apart, is_body);
+            let is_body = longest(apart) > MOVES && longest(bends) <= ALIKE + ALIKE_SHARE * length(apart) && z_near < least;
+            let is_other = is_body && is_known && longest(apart - nearest) > OTHERWISE * length(nearest);
+            let is_nearest = is_body && !is_known;
+            least = select(least, z_near, is_nearest || is_other);
+            found = select(found, apart, is_nearest);
+            other = select(other, apart, is_other);
             along = vec2f(along.x * TURN.x - along.y * TURN.y, along.x * TURN.y + along.y * TURN.x);
         }
+        nearest = found;
         reach *= RING_GROWTH;
     }
-    textureStore(bodies_out, id, found);
+    textureStore(bodies_out, id, nearest);
+    textureStore(others_out, id, other);
 }
 
-/// The motion of the nearest body to the neighbour, relative to the surface [px].
+/// The pixel that stands for a cell.
+fn middle_of(cell: vec2u) -> vec2i {
+    return inside(vec2i(CELL * cell + CELL / 2u));
+}
+
+/// The length of the longer of two motions.
+fn longest(both: vec4f) -> f32 {
+    return max(length(both.xy), length(both.zw));
+}
+
+/// The `k`th motion that the shadow in a cell may have: that of either body, and less of it. 0: there is none.
+fn motion_of(cell: vec2u, k: u32) -> vec4f {
+    let nearest = textureLoad(bodies, cell, 0);
+    let other = textureLoad(others, cell, 0);
+    return select(1.0, LESS, k % 2u == 1u) * select(nearest, other, k > 1u);
+}
+
+/// What differs around a cell with each of its motions.
+@compute @workgroup_size(WG_X, WG_Y)
+fn compare_bodies(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_part(group, local, CELL);
+    if any(id >= (frame.size + CELL - 1u) / CELL) { return; }
+    let middle = middle_of(id);
+    var sums = vec4f(0.0);
+    for (var n = 0u; n < MOTIONS; n++) {
+        let both = motion_of(id, n);
+        let way = select(both.xy, both.zw, NEXT);
+        var sum = 0.0;
+        let count = select(0, PLACES * PLACES, any(both != vec4f(0.0)));
+        for (var k = 0; k < count; k++) {
+            let place = vec2u(inside(middle + APART * (vec2i(k % PLACES, k / PLACES) - PLACES / 2)));
+            let x = vec2f(place) + 0.5;
+            sum += select(0.0, differs_by(place, x + way, x - way, HIDDEN), is_one_surface(middle, vec2i(place)));
+        }
+        sums[n] = sum;
+    }
+    textureStore(weighted, id, sums);
+}
+
+/// The motion with which the least differs, from both neighbours together.
+@compute @workgroup_size(WG_X, WG_Y)
+fn choose_body(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
+    let id = listed_part(group, local, CELL);
+    if any(id >= (frame.size + CELL - 1u) / CELL) { return; }
+    let id_other = min(id, textureDimensions(around_other) - 1u);
+    let differs = textureLoad(around, id, 0) + textureLoad(around_other, id_other, 0);
+    var best = motion_of(id, 0u);
+    var least = differs.x;
+    for (var k = 1u; k < MOTIONS; k++) {
+        let one = motion_of(id, k);
+        let is_better = any(one != vec4f(0.0)) && differs[k] < LESS_DIFFERS * least;
+        best = select(best, one, is_better);
+        least = select(least, differs[k], is_better);
+    }
+    textureStore(bodies_out, id, best);
+}
+
+/// The motion of a pixel's body to the neighbour, relative to the surface [px].
 fn body_at(id: vec2u) -> vec2f {
     let cell = id / CELL;
     let both = textureLoad(bodies, cell, 0);
@@ -80,30 +161,45 @@ fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) g
     let id = listed_pixel(group, local);
     if any(id >= frame.size) { return; }
     let x = vec2f(id) + 0.5;
-    let own = textureLoad(values, id, 0).a;
-    let other = textureLoad(values_there, id, 0).a;
-    let still = abs(other - own);
-    let ahead = values_there_at(x + textureLoad(flow, id, 0).xy).a;
-    let back = values_at(x + textureLoad(flow_back, id, 0).xy).a;
-    let searched = abs(ahead - own) + abs(back - other);
+    let is_seen = textureLoad(change, id, 0).a > 0.0;
+    let still = select(HIDDEN, 1.0, is_seen) * stays_by(id);
+    let searched = differs_by(id, x + textureLoad(flow, id, 0).xy, x + textureLoad(flow_back, id, 0).xy, select(HIDDEN, 1.0, is_seen));
     let turned = textureLoad(flow_other, id, 0);
     let extrapolated = differs_by(id, x - turned.xy, came_from(x, turned.xy), 0.0);
     let body = body_at(id);
-    let as_body = differs_by(id, x + body, x - body, still);
+    let as_body = differs_by(id, x + body, x - body, HIDDEN);
     textureStore(weighted, id, vec4f(searched, 2.0 * still, mix(searched, extrapolated, turned.z),
                                      select(as_body, searched, all(body == vec2f(0.0)))));
 }
 
-/// The difference of a pixel from the neighbour at `to`, and of the neighbour's from the frame at `was` [px]; `hidden` for each of
-/// them that a body hides.
+/// The difference of a pixel without motion. Where the neighbour does not show it, all that is there.
+fn stays_by(id: vec2u) -> f32 {
+    let own = textureLoad(values, id, 0).a;
+    return select(own, abs(textureLoad(values_there, id, 0).a - own), textureLoad(change, id, 0).a > 0.0);
+}
+
+/// The difference of a pixel from the neighbour at `to`, and of the neighbour's from the frame at `was` [px]. Where one of them is not
+/// seen on the pixel's surface, that without motion; where a body hides it, the share `hidden` of that.
 fn differs_by(id: vec2u, to: vec2f, was: vec2f, hidden: f32) -> f32 {
+    let px = vec2i(id);
     let landing = inside(vec2i(floor(to)));
-    let is_there = is_one_surface(vec2i(id), landing) && textureLoad(change, landing, 0).a > 0.0;
-    let is_here = is_one_surface(vec2i(id), vec2i(floor(was))) && textureLoad(change, id, 0).a > 0.0;
+    let origin = inside(vec2i(floor(was)));
+    let goes_on = is_one_surface(px, vec2i(floor(to)));
+    let came = is_one_surface(px, vec2i(floor(was)));
+    let is_there = goes_on && textureLoad(change, landing, 0).a > 0.0;
+    let is_here = came && textureLoad(change, id, 0).a > 0.0;
     let own = textureLoad(values, id, 0).a;
     let other = textureLoad(values_there, id, 0).a;
-    return select(hidden, abs(values_there_at(to).a - own), is_there)
-        + select(hidden, abs(values_at(was).a - other), is_here);
+    let still = stays_by(id);
+    let unseen = still * select(1.0, hidden, goes_on || is_before(landing, px));
+    let unseen_here = still * select(1.0, hidden, came || is_before(origin, px));
+    return select(unseen, abs(values_there_at(to).a - own), is_there)
+        + select(unseen_here, abs(values_at(was).a - other), is_here);
+}
+
+/// True if the surface at `a` is nearer than that at `b`. False where light rests: what is hidden there tells nothing.
+fn is_before(a: vec2i, b: vec2i) -> bool {
+    return textureLoad(planes, a, 0).x > NEARER * textureLoad(planes, b, 0).x;
 }
 
 /// The place of this frame [px] from which extrapolated flow leads to `x`, by a first guess of the way back to it.
@@ -131,13 +227,14 @@ fn choose(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     var best = vec4f(searched.xyz, explained(differs.x, differs.y));
     var least = differs.x;
     let other_explains = explained(differs.z, differs.y) * explained(differs_other.x, differs_other.y);
-    if turned.z * other_explains > best.z * best.w && differs.z < CLEARLY * least {
+    if turned.z * other_explains > best.z * best.w && differs.z < CLEARLY * differs.x {
         best = vec4f(-turned.xyz, other_explains);
-        least = differs.z;
     }
     let body = body_at(id);
-    let body_explains = explained(differs.w, differs.y);
-    if any(body != vec2f(0.0)) && body_explains > max(abs(best.z) * best.w, SURE) && differs.w < CLEARLY * least {
+    let both = differs + differs_other;     // a body moves from neighbour to neighbour
+    let body_explains = explained(both.w, both.y);
+    let has_to = max(SURE, searched.z * explained(both.x, both.y));
+    if any(body != vec2f(0.0)) && body_explains > has_to && both.w < BODY_CLEARLY * both.x {
         best = vec4f(body, -1.0, body_explains);
     }
     textureStore(flow_out, id, best);
@@ -174,7 +271,7 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let is_there = is_one_surface(vec2i(id), landing) && textureLoad(change, landing, 0).a > 0.0;
     let differs = abs(values_there_at(to).a - textureLoad(values, id, 0).a);
     let fits = select(1.0, 1.0 - min(differs / UNLIKE, 1.0), is_there);
-    let keep = max(own.z * own.w, 1.0 - fits);
+    let keep = select(max(own.z * own.w, 1.0 - fits), 0.0, chosen.z < 0.0);     // a body's is smooth
     let explains = max(own.w, fits * min(near.z / ENOUGH, 1.0));
     let filled = vec4f(mix(way, own.xy, keep), mix(1.0, own.z, keep), explains);
     let result = select(own, filled, near.z > SOME);

@@ -2,25 +2,12 @@
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
 
-@group(1) @binding(0) var<storage, read_write> found: Found;
+@group(1) @binding(0) var<storage, read_write> found: FoundTiles;
 @group(1) @binding(1) var<storage, read_write> changing: TileList;  // all lists are 0 at first
 @group(1) @binding(2) var<storage, read_write> near: TileList;
 @group(1) @binding(3) var<storage, read_write> whole: TileList;
 @group(1) @binding(4) var<storage, read_write> doubtful: TileList;
 @group(1) @binding(5) var<storage, read_write> beside: TileList;
-
-struct Found {
-    any: u32,           // see gain.wgsl
-    tiles: array<atomic<u32>>,
-}
-
-struct TileList {       // see active.wgsl
-    groups: vec3u,
-    count: atomic<u32>,
-    halved: vec3u,
-    free: u32,
-    tiles: array<u32>,
-}
 
 /// After `screen`: an invocation is a tile. Tiles beside one in which light may change are read with it.
 @compute @workgroup_size(WG_X, WG_Y)

@@ -10,12 +10,7 @@
 @group(1) @binding(4) var coherence: texture_2d<f32>;   // stored as r32float; of `find_gain`: what `find_coherence` wrote
 @group(1) @binding(5) var ratio_out: Ratio;
 @group(1) @binding(6) var scalar_out: Scalar;
-@group(1) @binding(7) var<storage, read_write> found: Found;
-
-struct Found {
-    any: atomic<u32>,   // 1 if light changes anywhere
-    tiles: array<atomic<u32>>,  // see active.wgsl
-}
+@group(1) @binding(7) var<storage, read_write> found: FoundTiles;
 
 alias Ratio = texture_storage_2d<rgba16float, write>;
 alias Scalar = texture_storage_2d<r32float, write>;

@@ -5,12 +5,7 @@
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/changes/both.wgsl
 
-@group(1) @binding(6) var<storage, read_write> found: Found;
-
-struct Found {
-    any: u32,
-    tiles: array<atomic<u32>>,  // see active.wgsl
-}
+@group(1) @binding(6) var<storage, read_write> found: FoundTiles;
 
 const DIFFERS: f32 = 0.075;     // share of a channel; changes of less than LEAST (gain.wgsl) do not count
 
