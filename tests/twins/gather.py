@@ -332,7 +332,10 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
         coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
     elif is_exact or not any(0.1 < share < 0.9 for share in shares):
         at_middle = float(z[y, x] < between) if is_exact else coverage
-        coverage, told = coverage_by_color(color[y, x], mean(color, front), back_color, at_middle)
+        beyond = 0 if is_exact else 0.4
+        coverage, told = coverage_by_color(
+            color[y, x], mean(color, front), back_color, at_middle, beyond
+        )
         is_guess = not told and at_middle < 0.5
         if is_guess:
             coverage = np.clip(coverage, 0, front_around(z < between, y, x))
@@ -355,8 +358,9 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     coverage = 1.0 if whole else coverage
     rest = color[y, x] - (1 - coverage) * back_color
     brightest = np.max([color[p] for p in [*front, (y, x)]], axis=0)
+    most = 2.0 if thin else 1.2
     front_color = np.maximum(
-        rest if seen is not None else np.minimum(rest, 2 * coverage * brightest), 0
+        rest if seen is not None else np.minimum(rest, most * coverage * brightest), 0
     )
     if not whole:
         back_color = back_color + (rest - front_color) / (1 - coverage)
@@ -369,8 +373,10 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
 
 
-def coverage_by_color(own, front, back, at_middle):
+def coverage_by_color(own, front, back, at_middle, beyond):
     """Place of a colour between two others, on the side of one half that the pixel's middle is.
+
+    Or up to `beyond` that on the other side.
 
     And whether it is near the line between them; else the farther off, the less it is.
     """
@@ -379,7 +385,8 @@ def coverage_by_color(own, front, back, at_middle):
     rest = off - share * way
     if way @ way <= 0.05**2 or rest @ rest >= way @ way / 16:
         return off @ way / max(way @ way + rest @ rest, 1e-12), False
-    return np.clip(share, 0.5, 1) if at_middle >= 0.5 else np.clip(share, 0, 0.5), True
+    low, high = (0.5 - beyond, 1) if at_middle >= 0.5 else (0, 0.5 + beyond)
+    return np.clip(share, low, high), True
 
 
 def front_around(is_front, y, x):

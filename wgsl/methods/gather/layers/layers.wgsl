@@ -32,7 +32,8 @@ const FRONT: u32 = 0u;          // layers of an array
 const BACK: u32 = 1u;
 
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
-const MOST_CONTRAST: f32 = 2.0; // of a front layer to the brightest pixel of it around, which may be half background
+const MOST_CONTRAST: f32 = 1.2; // of a front layer to the brightest pixel of it around,
+const WIRE_CONTRAST: f32 = 2.0; // which may be half background in a wire
 
 /// Those of a pixel and of the ones to its left and right together.
 fn three_flags(px: vec2i) -> u32 {
@@ -152,7 +153,8 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
         let behind = (1.0 - share) * edge.counts;
         let rest = edge.color - behind * background;
-        let most = select(MOST_CONTRAST * share * edge.counts * sides.brightest, vec4f(INFINITE), seen_around);
+        let contrast = select(MOST_CONTRAST, WIRE_CONTRAST, sides.thin);
+        let most = select(contrast * share * edge.counts * sides.brightest, vec4f(INFINITE), seen_around);
         let front = max(min(rest, most), vec4f(0.0));
         (*split).coverage = share;
         (*split).front = front;
