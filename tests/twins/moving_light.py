@@ -370,24 +370,25 @@ def motions_of(found):
 
 
 def compared(motions, own, other, depth, seen, side, known):
-    """Differences around each cell with each of its motions, at 5 x 5 places."""
+    """Differences around each cell with each of its motions, at 5 x 5 places, if one is dark."""
     rows, columns = np.mgrid[: motions.shape[1], : motions.shape[2]]
     y, x = (
         np.minimum(4 * n + 2, size - 1) for n, size in zip((rows, columns), own.shape, strict=True)
     )
     ways = motions[..., 2:] if side > 0 else motions[..., :2]
-    out = np.zeros((*y.shape, len(motions)))
+    out, dark_ = np.zeros((*y.shape, len(motions))), np.zeros(y.shape, bool)
     for b, a in np.ndindex(5, 5):
         place = (
             np.clip(y + 5 * (b - 2), 0, own.shape[0] - 1),
             np.clip(x + 5 * (a - 2), 0, own.shape[1] - 1),
         )
+        dark_ |= np.maximum(own, other)[place] > 0.1
         to = np.dstack([place[1] - x, place[0] - y])
         same = on_one_surface(to, depth, (y, x))
         for n, way in enumerate(ways):
             differs = differs_by(way, -way, own, other, depth, seen, 0.3, known, place)
             out[..., n] += np.where(same & motions[n].any(axis=2), differs, 0)
-    return out
+    return np.where(dark_[..., None], out, 0)
 
 
 def chosen_body(motions, differs):

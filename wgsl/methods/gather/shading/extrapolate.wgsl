@@ -108,26 +108,38 @@ fn motion_of(cell: vec2u, k: u32) -> vec4f {
     return select(1.0, LESS, k % 2u == 1u) * select(nearest, other, k > 1u);
 }
 
-/// What differs around a cell with each of its motions.
+/// What differs around a cell with each of its motions; nothing where there is no shadow in either frame.
 @compute @workgroup_size(WG_X, WG_Y)
 fn compare_bodies(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_part(group, local, CELL);
     if any(id >= (frame.size + CELL - 1u) / CELL) { return; }
     let middle = middle_of(id);
+    var darkest = 0.0;
+    for (var k = 0; k < PLACES * PLACES; k++) {
+        let place = place_around(middle, k);
+        darkest = max(darkest, max(textureLoad(values, place, 0).a, textureLoad(values_there, place, 0).a));
+    }
+    let is_one = all(textureLoad(others, id, 0) == vec4f(0.0));
+    let is_none = all(textureLoad(bodies, id, 0) == vec4f(0.0));
+    let motions = select(MOTIONS, MOTIONS / 2u, is_one);
+    let count = select(0, PLACES * PLACES, darkest > PRESENT && !is_none);
     var sums = vec4f(0.0);
-    for (var n = 0u; n < MOTIONS; n++) {
-        let both = motion_of(id, n);
-        let way = select(both.xy, both.zw, NEXT);
-        var sum = 0.0;
-        let count = select(0, PLACES * PLACES, any(both != vec4f(0.0)));
-        for (var k = 0; k < count; k++) {
-            let place = vec2u(inside(middle + APART * (vec2i(k % PLACES, k / PLACES) - PLACES / 2)));
-            let x = vec2f(place) + 0.5;
-            sum += select(0.0, differs_by(place, x + way, x - way, HIDDEN), is_one_surface(middle, vec2i(place)));
+    for (var k = 0; k < count; k++) {
+        let place = place_around(middle, k);
+        let x = vec2f(place) + 0.5;
+        let turns = select(0u, motions, is_one_surface(middle, place));
+        for (var n = 0u; n < turns; n++) {
+            let both = motion_of(id, n);
+            let way = select(both.xy, both.zw, NEXT);
+            sums[n] += differs_by(vec2u(place), x + way, x - way, HIDDEN);
         }
-        sums[n] = sum;
     }
     textureStore(weighted, id, sums);
+}
+
+/// Of the places around a cell's middle.
+fn place_around(middle: vec2i, k: i32) -> vec2i {
+    return inside(middle + APART * (vec2i(k % PLACES, k / PLACES) - PLACES / 2));
 }
 
 /// The motion with which the least differs, from both neighbours together.
