@@ -43,25 +43,41 @@ def test_each_half_of_a_picture_follows_the_source_that_is_right_there(height, w
 
 
 @pytest.mark.parametrize("margin, is_taken", [(1.0, False), (1.5, True)])
-def test_the_other_source_may_match_worse_up_to_the_margin(margin, is_taken):
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_the_other_source_may_match_worse_up_to_the_margin_where_the_one_is_lost(
+    margin, is_taken, is_lost
+):
     """The picture moves by 2 px; what is 2.5 px off differs a little more than what is 2 px off."""
+    near = [shifted(2 * n, 96, 320) for n in (-1, 0, 1)]
+    one, other = found(4, 1.0, 96, 320), found(4.5, 0.5, 96, 320)
+    loss = np.zeros((24, 80), bool)
+    loss[:, :40] = is_lost
+    motion, depth = better(near, one, other, margin, loss)
+    left, right = np.s_[24:-24, 24:136], np.s_[24:-24, 184:-24]
+    for inner, taken in ((left, is_taken and is_lost), (right, False)):
+        assert (motion[inner][..., 2] == (4.5 if taken else 4)).all()
+        assert (depth[inner] == (0.5 if taken else 1)).all()
+
+
+def test_loss_counts_around_it():
+    """Every second block along both axes is lost: with what is around, all is."""
     near = [shifted(2 * n, 96, 160) for n in (-1, 0, 1)]
     one, other = found(4, 1.0, 96, 160), found(4.5, 0.5, 96, 160)
-    motion, depth = better(near, one, other, margin)
-    inner = np.s_[24:-24, 24:-24]
-    assert (motion[inner][..., 2] == (4.5 if is_taken else 4)).all()
-    assert (depth[inner] == (0.5 if is_taken else 1)).all()
+    loss = np.zeros((24, 40), bool)
+    loss[::2, ::2] = True
+    motion, _ = better(near, one, other, 1.5, loss)
+    assert (motion[24:-24, 24:-24, 2] == 4.5).all()
 
 
-def test_a_source_that_is_clearly_better_in_the_picture_is_taken_throughout():
-    """All but the left sixth moves by 6 px, as the one source says; there, the other is right."""
-    near = [shifted(6 * n, 96, 300) for n in (-1, 0, 1)]
-    for n in (-1, 0, 1):
-        near[n + 1][:, :50] = shifted(2 * n, 96, 300)[:, :50]
-    motion, depth = better(near, found(2, 1.0, 96, 300), found(6, 0.5, 96, 300))
-    assert (motion[..., 2] == 6).all() and (depth == 0.5).all()
-    motion, _ = better(near, found(6, 0.5, 96, 300), found(2, 1.0, 96, 300))
-    assert (motion[8:-8, :20, 2] == 2).all() and (motion[8:-8, 90:, 2] == 6).all()
+def test_of_two_that_match_alike_the_one_that_changes_less_is_taken():
+    """Nothing is seen in the picture; in half of it, the one is ragged, in the other the other."""
+    near = [np.full((96, 320), 90, np.uint8)] * 3
+    ragged = np.random.default_rng(1).normal(0, 0.5, (96, 320)).astype(np.float32)
+    one, other = found(2, 1.0, 96, 320), found(6, 0.5, 96, 320)
+    one[0][:, :160, 2] += ragged[:, :160]
+    other[0][:, 160:, 2] += ragged[:, 160:]
+    _, depth = better(near, one, other)
+    assert (depth[:, :130] == 0.5).all() and (depth[:, 190:] == 1).all()
 
 
 def test_without_depth_there_is_none():
@@ -152,6 +168,22 @@ def test_where_neither_loses_clearly_less_the_match_decides():
     search.motions = {n: found(-13.7 if n % 2 else 10.3, 0.5, *size) for n in pictures}
     _, depth = BetterMatch(quick, search, by_ways=True).shot(pictures.get)(2)
     assert (depth[20:-20, 20:-20] == 1).all()
+
+
+@pytest.mark.parametrize("lost, is_taken", [(8, False), (60, True)])
+def test_where_much_is_lost_the_margin_holds_throughout(lost, is_taken):
+    """All moves by 2 px but the left, which flickers; there, the quick source turns from picture to
+    picture. Elsewhere it is 2 px off, and the search 2.5 px."""
+    height, width = 96, 320
+    pictures = {n: Both(shifted(2 * n, height, width), lambda: None) for n in range(3)}
+    for n, picture in pictures.items():
+        picture.grey[:, :lost] = 128 + 100 * (-1) ** n
+    quick = Told({n: found(4, 1.0, height, width) for n in pictures})
+    for n, (motion, _) in quick.motions.items():
+        motion[:, :lost] *= 4 * (-1) ** n
+    search = Told({n: found(4.5, 0.5, height, width) for n in pictures})
+    _, depth = BetterMatch(quick, search, margin=1.5).shot(pictures.get)(1)
+    assert (depth[24:-24, 120:-24] == (0.5 if is_taken else 1)).all()
 
 
 def test_each_picture_of_a_shot_is_asked_for_once_and_the_order_changes_nothing():

@@ -9,7 +9,7 @@ from .. import gpu
 from ..errors import InputError, did_you_mean
 from .passes import FlowPasses
 from .pyramid import level_sizes
-from .shot import EFFORTS, IN_SOFTWARE, Load, Shot
+from .shot import EFFORTS, IN_SOFTWARE, WHOLE, Load, Shot
 
 
 class Flow:
@@ -38,8 +38,10 @@ class Flow:
             hint = did_you_mean(quality, EFFORTS)
             raise InputError(f"no flow quality {quality!r}; available: {known}{hint}")
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        self._effort = (EFFORTS | IN_SOFTWARE if in_software and not whole else EFFORTS)[quality]
+        efforts = EFFORTS
+        if self.device.adapter_info["adapter_type"] == gpu.SOFTWARE:
+            efforts = EFFORTS | ({"fast": WHOLE} if whole else IN_SOFTWARE)
+        self._effort = efforts[quality]
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on: one more for every level."""

@@ -24,6 +24,7 @@ import wgpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
+from .edges import tiles_at_edges
 from .guide import finer, guide
 from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
@@ -49,7 +50,7 @@ class Effort:
     `block`: pixels along those that share a first state. `aside`: price of moving otherwise than
     most, see sweep.wgsl. `led`: on how many levels the guide may lead, from the coarsest on.
     `above`: longer sides [px] above which a picture is searched at a smaller size, whose longer
-    side is `longest`.
+    side is `longest`. `at_edges`: on the finest level only what is beside another motion is swept.
     """
 
     coarsest: int
@@ -61,6 +62,7 @@ class Effort:
     led: int
     above: float = math.inf
     longest: int = 0
+    at_edges: bool = False
 
     def searched_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """Width, height at which a picture of a size is searched, in the same proportion."""
@@ -81,6 +83,8 @@ EFFORTS = {
     "fast": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1),
     "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, above=440, longest=440),
 }
+# "fast" at full size without a GPU, where it is to be thorough:
+WHOLE = replace(EFFORTS["fast"], finest=1, block=2, at_edges=True)
 IN_SOFTWARE = {"fast": replace(EFFORTS["fast"], above=1280, longest=960)}  # instead, without a GPU
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
@@ -201,7 +205,11 @@ class Shot:
             self._results["most", number, level] = both
             states = self._led(views, level, states)
             return self._polished(states, size, bound) if level else states
-        states = self._grown(self._once("mended", number, level + 1, self._mended), level)
+        coarser = self._once("mended", number, level + 1, self._mended)
+        states = self._grown(coarser, level)
+        tiles = None
+        if not level and self._effort.at_edges:
+            tiles = tiles_at_edges(passes, size, coarser)
         if level > coarsest - self._effort.led and len(views.neighbours) == 2:
             states = self._led(views, level, states)
         guesses = (
@@ -210,7 +218,7 @@ class Shot:
         most = enlarged(self._results["most", number, coarsest][0], 2.0 ** (coarsest - level))
         leads = (self._results.get(("lead", number, k)) for k in range(level, coarsest + 1))
         lead = next(one for one in leads if one is not None)
-        states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
+        states = sweep(passes, size, swept, states, guesses, level, count, most, lead, tiles)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 

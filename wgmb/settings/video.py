@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 
 _FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
-_MARGIN = 1.5  # of that search beside dense inverse search, see BetterMatch
+_MARGIN = 1.5  # of that search beside dense inverse search, see BetterMatch,
+_BEST_MARGIN = 1.3  # and of the best one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class FlowSettings:
             from ..flow.dis.better_match import BetterMatch
 
             search = Flow(quality="fast", device=device, whole=True)
-            return BetterMatch(Dis("best"), search, by_ways=True), how
+            return BetterMatch(Dis("best"), search, _BEST_MARGIN, by_ways=True), how
         return Flow(quality=settings.flow_quality, device=device), how
 
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:

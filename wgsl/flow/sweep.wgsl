@@ -5,6 +5,7 @@
 //#include flow/band.wgsl
 //#include flow/plane.wgsl
 //#include flow/steps.wgsl
+//#include flow/edges/tile.wgsl
 
 struct Sweep {
     color: u32,         // of the chessboard: 0 or 1
@@ -17,8 +18,8 @@ struct Sweep {
     is_known: u32,      // 1 if `costs` tells what the states of this colour cost
     most: mat4x4f,      // homography of most of the picture to the near frame: columns of 3, from pixels to pixels
     lead_factor: f32,   // pixels of this level along one of `lead`; 0 if there is none
-    unused: u32,
-    unused_too: vec2u,
+    across: u32,        // how many of `tiles` lie side by side in a dispatch; 0 if it is over the whole picture
+    unused: vec2u,
 }
 
 @group(1) @binding(5) var<uniform> sweep: Sweep;
@@ -28,6 +29,7 @@ struct Sweep {
 @group(1) @binding(9) var<storage, read_write> costs: array<f32>;   // of every pixel's state: its match
 @group(1) @binding(10) var output: StatesOut;
 @group(1) @binding(11) var lead: texture_2d_array<f32>;         // the guide, and where it leads: see repeats.wgsl
+@group(1) @binding(12) var<storage, read> tiles: array<vec2u>;  // those that are swept, one for a workgroup
 
 const SMOOTHNESS: f32 = 0.08;       // cost of 1 px of difference from the neighbours
 const BEND_SHARE: f32 = 0.5;        // of a difference of bends, against one of flows
@@ -143,7 +145,14 @@ fn attempt(best: Best, candidate: State) -> Best {
 }
 
 /// The pixel of an invocation, which has the chessboard's colour; the one beside it is other_pixel().
-fn own_pixel(at: vec2u) -> vec2i {
+fn own_pixel(local: u32, group: vec3u) -> vec2i {
+    if sweep.across == 0u { return of_color(banded_pixel(local, group)); }
+    let block = vec2u(local / 8u % (TILE / 4u), local / (2u * TILE));   // of 4 x 2, as in swizzled_pixel()
+    let by = vec2u(4u, 2u) * block + vec2u(local % 4u, local / 4u % 2u);
+    return of_color(TILE * tiles[(band.first + group.y) * sweep.across + group.x] + by);
+}
+
+fn of_color(at: vec2u) -> vec2i {
     return vec2i(vec2u(2u * at.x + (at.y + sweep.color) % 2u, at.y));
 }
 
@@ -187,7 +196,7 @@ fn source_of(px: vec2i, k: u32) -> vec2i {
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn propagate(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let px = own_pixel(banded_pixel(local, group));
+    let px = own_pixel(local, group);
     var best = begin(min(px, vec2i(frame.size) - 1));
     let own = 1u - sweep.is_known;
     let turns = turns_of(PROPAGATED + own, local);
@@ -238,7 +247,7 @@ fn varied(state: State, plane: Plane, px: vec2i, k: u32) -> State {
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn refine(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
-    let px = own_pixel(banded_pixel(local, group));
+    let px = own_pixel(local, group);
     let inside = min(px, vec2i(frame.size) - 1);
     var best = begin(inside);
     let plane = fitted_plane(here, states, inside, best.state);

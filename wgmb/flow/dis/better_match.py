@@ -1,4 +1,4 @@
-"""Motion of two sources: a search, where it matches better than dense inverse search."""
+"""Motion of two sources: a search, where it is better than dense inverse search."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import Flow
-from .consistency import SHARE, SPACING, changing, lost
+from .consistency import SPACING, changing, lost
 from .inverse_search import Dis, Found
 
 LONGEST = 480  # px along the longer side at which matches are compared
-PATCH = 5  # px of these a side of a match
-AROUND = 25  # px of these a side over which matches are averaged
-CLEARLY = 0.8  # of the one's mean difference in a picture, or of what it loses there: below it, the
-# other is right throughout
+PATCH = 5  # px of these a side of a match, and over which changes of motion are averaged
+AROUND = 25  # px of these a side over which what is compared is averaged
+ROUGH = 2.5  # levels of 255 that the motion's change from a pixel to the next costs, per px,
+MOST_ROUGH = 4.0  # px, beyond which a change costs no more
+LOST_AROUND = 9  # px of these a side around what is lost, which count as lost
+MUCH = 0.03  # of a picture: where the one loses more, all of it counts as lost;
+CLEARLY = 0.4  # where the other loses less than so much of that, it is right throughout,
+AT_ENDS = 0.75  # or than this at the ends of a shot, as both lose what the only neighbour hides
 
 
 class Both(NamedTuple):
@@ -28,15 +32,15 @@ class Both(NamedTuple):
 
 
 class BetterMatch:
-    """Motion and depth order from dense inverse search and from a search, whichever matches better.
+    """Motion and depth order from dense inverse search and from a search, the better per place.
 
-    `margin`: how many times the difference of dense inverse search that of the search may be. A
-    thorough dense inverse search makes it small also where it follows something else. A search that
-    finds nothing leaves states without order, which are specks in a blurred picture; there, dense
-    inverse search is smooth.
+    Better is what matches better and changes less from pixel to pixel. `margin`: how many times
+    that of dense inverse search the cost of the search may be where dense inverse search loses
+    something, by the ways there and back (consistency.py), and throughout where it loses much of
+    a picture: it makes differences small also where it follows something else.
 
-    `by_ways`: the search is taken throughout also where it loses clearly less of a picture, by the
-    ways there and back (consistency.py). For that, those beside a picture are searched, too.
+    `by_ways`: the search is taken throughout where much of a picture is lost, and clearly less of
+    it by the search. For that, those beside a picture are searched, too.
     """
 
     def __init__(self, quick: Dis, search: Flow, margin: float = 1.0, by_ways: bool = False):
@@ -45,7 +49,8 @@ class BetterMatch:
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on."""
-        return self._by_ways + max(self._quick.reach(size), self._search.reach(size))
+        quick, search = self._quick.reach(size), self._search.reach(size)
+        return max(quick, self._by_ways + search)
 
     def shot(
         self, load: Callable[[int], Both | np.ndarray | None], depth: bool = True
@@ -65,69 +70,73 @@ class BetterMatch:
             picture = load(number)
             return picture.light() if isinstance(picture, Both) else picture
 
-        sources = _Sources(self._quick.shot(grey, depth), self._search.shot(light))
+        quick, search = _Source(self._quick.shot(grey, depth)), _Source(self._search.shot(light))
 
         def better_of(number: int) -> Found | None:
-            found = sources(number)
-            if found is None:
+            one, other = quick(number), search(number)
+            if one is None or other is None:
                 return None
-            one, other = found
-            near = [grey(n) for n in (number - 1, number, number + 1)]
-            if self._by_ways:
-                prev, here, next = near
-                assert here is not None
-                changes = changing(self._quick.change(prev, here, next))
-                loss, others = sources.lost(number, changes)
-                if loss > SHARE and others < CLEARLY * loss:
+            prev, here, next = (grey(n) for n in (number - 1, number, number + 1))
+            assert here is not None
+            changes = changing(self._quick.change(prev, here, next))
+            loss = quick.lost(number, changes)
+            is_much = loss.mean() > MUCH
+            if self._by_ways and is_much:
+                others = search.lost(number, changes)
+                clearly = AT_ENDS if prev is None or next is None else CLEARLY
+                if others.mean() < clearly * loss.mean():
                     return other[0], None if one[1] is None else other[1]
-            return better(near, one, other, self._margin)
+            return better([prev, here, next], one, other, self._margin, loss | is_much)
 
         return better_of
 
 
-class _Sources:
-    """The motion of a shot's pictures by two sources, each found once, and what they lose."""
+class _Source:
+    """The motion of a shot's pictures, each found once if asked for in order, and what it loses."""
 
-    def __init__(self, *shots: Callable[[int], Found | None]):
-        self._shots = shots
-        self._ahead: dict[int, list[Found]] = {}
-        self._ways: list[dict[int, tuple[np.ndarray, np.ndarray]]] = [{} for _ in shots]
+    def __init__(self, shot: Callable[[int], Found | None]):
+        self._shot = shot
+        self._ahead: dict[int, Found] = {}
+        self._ways: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
-    def __call__(self, number: int) -> list[Found] | None:
-        """Motion and depth of a picture by each source; None where it is alone."""
+    def __call__(self, number: int) -> Found | None:
+        """Motion and depth of a picture; None where it is alone."""
         for old in [n for n in self._ahead if n < number]:
             del self._ahead[old]
         return self._ahead.pop(number, None) or self._motion_of(number)
 
-    def lost(self, number: int, changes: np.ndarray) -> list[float]:
-        """The share of a picture that each source loses, see consistency.lost.
+    def lost(self, number: int, changes: np.ndarray) -> np.ndarray:
+        """Losses of a picture, see consistency.lost.
 
         The motion of the next picture is kept until it is asked for.
         """
-        for ways in self._ways:
-            for old in [n for n in ways if abs(n - number) > 1]:
-                del ways[old]
+        for old in [n for n in self._ways if abs(n - number) > 1]:
+            del self._ways[old]
         for n in (number - 1, number + 1):
-            if n not in self._ways[0] and (found := self._motion_of(n)) is not None and n > number:
+            if n not in self._ways and (found := self._motion_of(n)) is not None and n > number:
                 self._ahead[n] = found
-        return [float(lost(ways, number, changes).mean()) for ways in self._ways]
+        return lost(self._ways, number, changes)
 
-    def _motion_of(self, number: int) -> list[Found] | None:
-        found = [shot(number) for shot in self._shots]
-        sure = [one for one in found if one is not None]
-        if len(sure) < len(found):
-            return None
-        for ways, (motion, _) in zip(self._ways, sure, strict=True):
-            thin = motion[::SPACING, ::SPACING]
-            ways[number] = thin[..., :2].copy(), thin[..., 2:].copy()
-        return sure
+    def _motion_of(self, number: int) -> Found | None:
+        found = self._shot(number)
+        if found is not None:
+            thin = found[0][::SPACING, ::SPACING]
+            self._ways[number] = thin[..., :2].copy(), thin[..., 2:].copy()
+        return found
 
 
-def better(near: list[np.ndarray | None], one: Found, other: Found, margin: float = 1.0) -> Found:
-    """`other` where its match, averaged over some pixels, is up to `margin` times that of `one`.
+def better(
+    near: list[np.ndarray | None],
+    one: Found,
+    other: Found,
+    margin: float = 1.0,
+    loss: np.ndarray | None = None,
+) -> Found:
+    """`other` where its cost, averaged over some pixels, is less than that of `one`.
 
-    Where it is clearly better in the mean of the picture, `other` is taken throughout. `near`: a
-    picture between its neighbours, of which one may lack, (height, width) uint8.
+    `near`: a picture between its neighbours, of which one may lack, (height, width) uint8. `loss`:
+    of blocks of `SPACING`, bool, where `one` is lost, and the cost of `other` may be `margin`
+    times as large.
     """
     cv2: Any = importlib.import_module("cv2")
     here = near[1]
@@ -135,13 +144,13 @@ def better(near: list[np.ndarray | None], one: Found, other: Found, margin: floa
     height, width = here.shape
     step = -(-max(here.shape) // LONGEST)
     small = [None if g is None else _small(g, step).astype(np.float32) for g in near]
-    matches = []
+    costs = []
     for motion, _ in (one, other):
-        thin = motion[step // 2 :: step, step // 2 :: step] / np.float32(step)
-        matches.append(_match(small, np.ascontiguousarray(thin)))
-    if matches[1].mean() < CLEARLY * matches[0].mean():
-        return other[0], None if one[1] is None else other[1]
-    gain = cv2.blur(margin * matches[0] - matches[1], (AROUND, AROUND))
+        thin = np.ascontiguousarray(motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
+        costs.append(_match(small, thin) + ROUGH * _roughness(thin))
+    if loss is not None:
+        costs[0] *= 1 + (np.float32(margin) - 1) * _grown(loss, costs[0].shape)
+    gain = cv2.blur(costs[0] - costs[1], (AROUND, AROUND))
     takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
     rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
     takes = np.pad(takes, ((0, max(rows, 0)), (0, max(columns, 0))), mode="edge")
@@ -172,3 +181,19 @@ def _match(near: list[np.ndarray | None], motion: np.ndarray) -> np.ndarray:
             moved = cv2.remap(other, *at, cv2.INTER_LINEAR, borderMode=edge)
             found.append(cv2.blur(np.abs(moved - here), (PATCH, PATCH)))
     return np.minimum.reduce(found)
+
+
+def _roughness(motion: np.ndarray) -> np.ndarray:
+    """By how much the motion changes from a pixel to those right of it and below, in patches."""
+    cv2: Any = importlib.import_module("cv2")
+    change = np.zeros(motion.shape[:2], np.float32)
+    change[:, :-1] += np.abs(np.diff(motion, axis=1)).sum(axis=2)
+    change[:-1] += np.abs(np.diff(motion, axis=0)).sum(axis=2)
+    return cv2.blur(np.minimum(change, MOST_ROUGH), (PATCH, PATCH))
+
+
+def _grown(loss: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Losses of blocks and the pixels near by, (height, width) 0 or 1, at another size."""
+    cv2: Any = importlib.import_module("cv2")
+    lost = cv2.resize(loss.astype(np.float32), shape[::-1], interpolation=cv2.INTER_NEAREST)
+    return cv2.dilate(lost, np.ones((LOST_AROUND, LOST_AROUND), np.uint8))
