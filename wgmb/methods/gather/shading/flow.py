@@ -87,17 +87,18 @@ def flows(
     pictures: Mapping[int, tuple[View, list[Level]]],
     changed: Mapping[int, View],
     surfaces: Mapping[str, View],
+    by_color: bool,
 ) -> dict[int, LightFlow]:
     """Flow to each neighbour, by its offset; `pictures`: values and their pyramids, 0 of the frame.
 
     `changed`: changes of light to each neighbour. `surfaces`: "depth", "planes" and "motion" of the
-    frame itself, over whose surfaces all move.
+    frame itself, over whose surfaces all move. `by_color`: the light is the picture itself.
     """
     searched = {side: _flow(stage, side, pictures[0], pictures[side], surfaces) for side in changed}
     if stage.pulled:
         return searched
     values = {side: view for side, (view, _) in pictures.items()}
-    ahead = _extrapolated(stage, searched, values, changed, surfaces)
+    ahead = _extrapolated(stage, searched, values, changed, surfaces, by_color)
     return {side: LightFlow(ahead[side], way.back) for side, way in searched.items()}
 
 
@@ -107,6 +108,7 @@ def _extrapolated(
     values: Mapping[int, View],
     changed: Mapping[int, View],
     surfaces: Mapping[str, View],
+    by_color: bool,
 ) -> dict[int, View]:
     """Flow to each neighbour, not as searched where the other one or a body explains more."""
     none, wide = stage.none("rgba16float"), stage.none("rgba32float")
@@ -125,9 +127,8 @@ def _extrapolated(
             "flow_out": spare, "bodies_out": spare, "others_out": spare,
             "weighted": stage.unused("rgba32float"), **surfaces,
         }  # fmt: skip
-        stage.run(
-            "extrapolate", entry, over="near", constants={"NEXT": side > 0}, **given | bindings
-        )
+        constants: dict[str, float] = {"NEXT": side > 0, "COLORS": by_color}
+        stage.run("extrapolate", entry, over="near", constants=constants, **given | bindings)
 
     spare, one = stage.unused("rgba16float"), next(iter(searched))
     run("find_bodies", one, halved=True, bodies=none, bodies_out=nearest, others_out=others)

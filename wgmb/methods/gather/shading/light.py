@@ -148,7 +148,7 @@ class MovingLight:
             "planes": planes(stage, depth),
             "motion": kind.frames[0].motion,
         }
-        found = flows(stage, seen, changed, surfaces)
+        found = flows(stage, seen, changed, surfaces, kind.by_color)
         if not stage.pulled:
             _carry(stage, present[0], found, times)
         result = self._images.texture(

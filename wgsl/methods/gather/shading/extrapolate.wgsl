@@ -24,15 +24,16 @@ alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
 
 override NEXT: bool = false;    // the neighbour is the next frame
+override COLORS: bool = false;  // the light is the picture itself: its differences may be texture, so that a guess has to explain more
+override SURE: f32 = select(0.5, 0.75, COLORS);             // how much the motion of a body has to explain
+override BODY_CLEARLY: f32 = select(0.83, 0.75, COLORS);    // as CLEARLY, of a body
+override HIDDEN: f32 = select(0.3, 1.0, COLORS);    // share of what differs without motion that counts where a body hides what it is compared with
 
 const CLEARLY: f32 = 0.75;      // share of other differences from which on less is clearly less
 const MISSED: f32 = 0.85;       // share of the differences without flow from which on it explains nothing,
 const EXPLAINED: f32 = 0.6;     // and up to which it explains them
 const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
 const SOME: f32 = 0.01;         // the same from which on it is told at all
-const SURE: f32 = 0.5;          // how much the motion of a body has to explain
-const BODY_CLEARLY: f32 = 0.83; // as CLEARLY, of a body
-const HIDDEN: f32 = 0.3;        // share of what differs without motion that counts where a body hides what it is compared with
 const UNLIKE: f32 = 0.3;        // difference of values from which on flow around does not fit
 const CELL: u32 = 4u;           // side [px]
 const RINGS: u32 = 8u;          // around a cell, in which bodies are looked for,
@@ -184,10 +185,11 @@ fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) g
                                      select(as_body, searched, all(body == vec2f(0.0)))));
 }
 
-/// The difference of a pixel without motion. Where the neighbour does not show it, all that is there.
+/// The difference of a pixel without motion. Where the neighbour does not show it, all that is there; of colours nothing.
 fn stays_by(id: vec2u) -> f32 {
     let own = textureLoad(values, id, 0).a;
-    return select(own, abs(textureLoad(values_there, id, 0).a - own), textureLoad(change, id, 0).a > 0.0);
+    let differs = abs(textureLoad(values_there, id, 0).a - own);    // 0 where it is not shown
+    return select(own, differs, COLORS || textureLoad(change, id, 0).a > 0.0);
 }
 
 /// The difference of a pixel from the neighbour at `to`, and of the neighbour's from the frame at `was` [px]. Where one of them is not
