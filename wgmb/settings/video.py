@@ -65,7 +65,7 @@ class FlowSettings:
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:
         """True if the best search takes dense inverse search where that matches better.
 
-        Without a GPU, both take a third of the time of the best search alone.
+        Without a GPU, both take two fifths of the time of the best search alone.
         """
         is_best = self.flow == "search" and self.flow_quality == "best"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
