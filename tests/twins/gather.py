@@ -626,7 +626,8 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             frame.trajectory[int(back)], centre, seed, u, first
         )
         at, size = centre - d, np.array(frame.edgeless.shape[::-1])
-        is_there = pixel is not None and residual <= 1.0 and (at >= 0).all() and (at < size).all()
+        most = 0.5 if f else 1.0
+        is_there = pixel is not None and residual <= most and (at >= 0).all() and (at < size).all()
         if first is None and not back and f not in far:
             misses.append(residual)
         again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
@@ -635,7 +636,8 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
             found = Sample(z * weight, z, residual, at, f, back, pixel)
             is_opaque = back or frame.edgeless[pixel]
-            again = f > 0 and not is_opaque and seen[1].frame == 0
+            same = abs(t) < 0.0625 and z < seen[1].true_depth * 1.3
+            again = f > 0 and (not is_opaque or same) and seen[1].frame == 0
             covered = f > 0 and is_covered(layers[0], x, y, found.true_depth, t)
             if not covered and (not (f in far or again) or is_hidden(layers[0], frame, found)):
                 record(seen, found, is_opaque)

@@ -11,6 +11,8 @@ const SCATTERED: u32 = 16u;             // bit of what is scattered among the pe
 const MAX_STEP_RATIO: f32 = 0.5;        // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 const BODY_DEPTH_RATIO: f32 = 1.3;      // of depths close together on one body: at outlines, round ones fall away steeply
+const OWN_TIME: f32 = 0.0625;           // up to here from its instant, the frame itself is surer of the surface of a silhouette [frame intervals]
+const NEIGHBOUR_RESIDUAL: f32 = 0.5;    // MAX_RESIDUAL of other frames' samples: what turns away from edge on is wide there
 const GOES_ON: f32 = 5.0;               // how far a surface is taken to go on behind something nearer [px]
 
 struct Sample {
@@ -133,7 +135,8 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
     var is_first = true;
     loop {
         let state = find_surface(&seeds, query, own, there, is_first, first, (*visible).opaque.depth);
-        let is_there = state.residual2 <= MAX_RESIDUAL * MAX_RESIDUAL && is_inside(query.x - state.d);
+        let most = select(MAX_RESIDUAL, NEIGHBOUR_RESIDUAL, query.layer > 1u);
+        let is_there = state.residual2 <= most * most && is_inside(query.x - state.d);
         if is_first && is_there { first = state.d; }
         if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
@@ -210,7 +213,10 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
     let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
     // A silhouette of the frame's own is not found once more a frame interval away, where paths that bend are off.
-    let is_again = query.layer > 1u && z < 0.0 && (*visible).front_edge.layer < 2u;
+    let t = query.u + offset_of(query.layer / 2u);
+    let front_edge_z = (*visible).front_edge.true_depth;
+    let is_own = z < 0.0 || (abs(t) < OWN_TIME && found.true_depth < front_edge_z * BODY_DEPTH_RATIO);
+    let is_again = query.layer > 1u && (*visible).front_edge.layer < 2u && is_own;
     let is_still_covered = query.layer > 1u && is_covered((*visible).front_cover, (*visible).back_cover, found.true_depth);
     let counts = !is_still_covered && (!(is_far(query.layer) || is_again) || is_hidden(found));
     if counts && z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
