@@ -695,8 +695,8 @@ def is_hidden(own, frame, found):
 
 
 def is_covered(own, x, y, z, t):
-    """True if the own surface of a pixel, before the depth z, goes on behind something nearer."""
-    layer = int(0 < own.depth[1][y, x] * 1.3 < z)
+    """True if the last own surface of a pixel, before the depth z, goes on behind another."""
+    layer = int(own.depth[1][y, x] > 0)
     step = moved(own.trajectory[layer][y, x], t)
     i, j = np.floor(np.array([x, y]) + 0.5 - step).astype(int)
     is_inside = 0 <= i < own.depth[0].shape[1] and 0 <= j < own.depth[0].shape[0]

@@ -17,7 +17,6 @@ class Bends:
 
     def encode(self, encoder, inputs: Inputs, frames: Sequence[PreparedFrame]) -> list[View]:
         """Record the bends of these frames of the inputs; returns them in the same order."""
-        kernel = gpu.kernel(self._device, "methods/five_positions.wgsl")
         by_offset = {frame.offset: frame for frame in inputs.frames}
         made = []
         for frame in frames:
@@ -29,15 +28,10 @@ class Bends:
                 for side, other in around.items()
                 for name in ("motion", "depth")
             }
-            kernel.run(
-                encoder,
-                "main",
-                inputs.bindings,
-                motion=frame.motion,
-                depth=frame.depth,
-                bends=bends,
-                **others,
-            )
+            read = others | {"motion": frame.motion, "depth": frame.depth}
+            texels = {name: gpu.stored(view) for name, view in read.items()}
+            kernel = gpu.kernel(self._device, "methods/five_positions.wgsl", texels)
+            kernel.run(encoder, "main", inputs.bindings, bends=bends, **read)
             made.append(bends)
         return made
 

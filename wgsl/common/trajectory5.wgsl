@@ -1,12 +1,7 @@
 // Paths through five positions, from the vectors of three frames: those of a neighbour, where the surface is by then,
-// lead on to the frame after it. Where there is no such neighbour its textures are empty: their depth is 0.
-//#include common/depth.wgsl
-//#include common/frame.wgsl
+// lead on to the frame after it.
 //#include common/path.wgsl
 
-const RETURNS: f32 = 1.5;               // a surface is found again where its vector leads back within this [px]
-const SAME_DEPTH_RATIO: f32 = 1.15;     // and its depth has not changed by more: it may come nearer
-const MOST_DEPTH_CHANGE: f32 = 1.5;     // the same, for its depth there to be believed
 const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame to the next, as a ratio
 const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
 const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
@@ -75,38 +70,6 @@ fn swing_factor(here: f32, mean: f32) -> f32 {
 fn turn_factor(cosine: f32) -> f32 {
     let half_angle = sqrt(0.5 + 0.5 * clamp(cosine, LEAST_COSINE, 1.0));    // its cosine
     return 2.0 / (half_angle * (1.0 + half_angle));
-}
-
-/// Half the acceleration in a neighbouring frame of what is displaced by `step` [px] up to it: where it is by then, or beside a
-/// silhouette, in the one of the four pixels around whose vector leads back best.
-fn acceleration_in(motion_there: texture_2d<f32>, depth_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32,
-                   is_next: bool) -> Acceleration {
-    let at = vec2f(px) + 0.5 + step;
-    let is_inside = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
-    let beside = select(vec2f(-1.0), vec2f(1.0), fract(at) >= vec2f(0.5));
-    var result = Acceleration(vec2f(0.0), false, 1.0);
-    var least = RETURNS * RETURNS;
-    var i = 0;
-    loop {
-        let place = at + beside * vec2f(vec2i(i & 1, i >> 1u));
-        let there = vec2i(clamp(place, vec2f(0.0), vec2f(frame.size) - 1.0));
-        let vectors = textureLoad(motion_there, there, 0);
-        let given = textureLoad(depth_there, there, 0).x;
-        let ratio = valid_depth(given) / z;
-        let off = select(vectors.zw, vectors.xy, is_next) + step;
-        let returns = is_inside && given > 0.0 && dot(off, off) < least;
-        let change = max(ratio, 1.0 / ratio);
-        let is_known = returns && change < SAME_DEPTH_RATIO;
-        if is_known || (i == 0 && returns && change < MOST_DEPTH_CHANGE) { result.depth_ratio = ratio; }
-        if is_known {
-            result.half = 0.5 * (vectors.xy + vectors.zw);
-            result.is_known = true;
-            least = dot(off, off);
-        }
-        i++;
-        if i > 3 || (i == 1 && (is_known || !is_inside)) { break; }
-    }
-    return result;
 }
 
 /// The part of a trajectory that three positions do not tell, in a word: its third term, or KINKED.

@@ -146,7 +146,8 @@ class Search:
     def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
         """Record the second differences of the frame's own colours."""
         differences = self._images.view("second differences", inputs.bindings.size, "rgba32uint")
-        kernel = gpu.kernel(self._device, "methods/gather/search/cubic.wgsl")
+        texels = {"color": gpu.stored(inputs.frame.color)}
+        kernel = gpu.kernel(self._device, "methods/gather/search/cubic.wgsl", texels)
         kernel.run(
             encoder,
             "main",

@@ -102,10 +102,17 @@ class Layers:
             "size_dispatch": (None, cells),
             "separate_layers": (groups, cells),
         }
+        read = {name: getattr(frame, name) for name in ("color", "motion", "depth")}
+        others = {
+            f"{side}_{name}": getattr(other, name, None) or inputs.unbound
+            for side, other in neighbours.items()
+            for name in ("color", "motion", "depth", "weight")
+        }
+        written = {"Color": colors.format, "Mattes": self.textures["mattes"].format}
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers/layers.wgsl",
-            {"Color": colors.format, "Mattes": self.textures["mattes"].format},
+            written | {name: gpu.stored(view) for name, view in (read | others).items()},
             WEIGHTED=frame.weight is not None,
             COPIED=copied,
             HAS_PREV=neighbours["prev"] is not None,
@@ -118,11 +125,6 @@ class Layers:
         )
         pixels = self._edge_pixels.at_least(4 + 4 * size[0] * size[1])
         encoder.clear_buffer(pixels, 0, 4)
-        others = {
-            f"{side}_{name}": getattr(other, name, None) or inputs.unbound
-            for side, other in neighbours.items()
-            for name in ("color", "motion", "depth", "weight")
-        }
         gains = {
             f"{side}_gains": self._relight.gains(size, step)
             for side, step in (("prev", -1), ("next", 1))
@@ -135,12 +137,10 @@ class Layers:
                 replace(inputs.bindings, size=(1, 1)) if sizing else inputs.bindings,
                 indirect,
                 worklist=worklist,
-                color=frame.color,
-                motion=frame.motion,
-                depth=frame.depth,
                 weight=frame.weight or inputs.unbound,
                 edges=pixels,
                 edge_groups=groups if sizing else self._unused.at_least(16),
+                **read,
                 **found,
                 **self._views(slot),
                 **self._far(inputs, frame.offset),

@@ -35,7 +35,11 @@ class Relight:
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers/relight.wgsl",
-            {"Color": relit.texture.format},
+            {
+                "Color": relit.texture.format,
+                "color": gpu.stored(frame.color),
+                "own_texels": gpu.stored(inputs.frame.color),
+            },
             WEIGHTED=frame.weight is not None,
         )
         data = np.zeros((), kernel.source.dtype("RelitFrame"))
@@ -67,6 +71,7 @@ class Relight:
                 weight=frame.weight or inputs.unbound,
                 front_surface=front,
                 own_color=inputs.frame.color,
+                own_texels=inputs.frame.color,
                 own_weight=inputs.frame.weight or inputs.unbound,
                 own_surface=own,
                 worklist=cells,

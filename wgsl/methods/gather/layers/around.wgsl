@@ -1,18 +1,14 @@
 // Information from the frames before and after a frame: paths of surfaces beyond them, and backgrounds that it hides.
 // Where there is no such frame its textures are empty, and not read.
 //#include common/depth.wgsl
-//#include common/trajectory5.wgsl
+//#include common/accelerations.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/layers/gains.wgsl
 //#include methods/gather/surface.wgsl
 
-@group(1) @binding(12) var prev_color: texture_2d<f32>;
-@group(1) @binding(13) var prev_motion: texture_2d<f32>;
-@group(1) @binding(14) var prev_depth: texture_2d<f32>;
+@group(1) @binding(12) var prev_color: texture_2d<f32>;      // stored as given
 @group(1) @binding(15) var prev_weight: texture_2d<f32>;
-@group(1) @binding(16) var next_color: texture_2d<f32>;
-@group(1) @binding(17) var next_motion: texture_2d<f32>;
-@group(1) @binding(18) var next_depth: texture_2d<f32>;
+@group(1) @binding(16) var next_color: texture_2d<f32>;      // stored as given
 @group(1) @binding(19) var next_weight: texture_2d<f32>;
 
 @group(1) @binding(24) var<storage, read> prev_gains: array<u32>;   // per pixel, see relight.wgsl
@@ -41,8 +37,8 @@ struct SurfaceAround {
 fn surface_around(px: vec2i, motion: vec4f, z: f32) -> SurfaceAround {
     var before = Acceleration(vec2f(0.0), false, 1.0);
     var after = before;
-    if HAS_PREV { before = acceleration_in(prev_motion, prev_depth, px, motion.xy, z, false); }
-    if HAS_NEXT { after = acceleration_in(next_motion, next_depth, px, motion.zw, z, true); }
+    if HAS_PREV { before = acceleration_in(px, motion.xy, z, false); }
+    if HAS_NEXT { after = acceleration_in(px, motion.zw, z, true); }
     let depth_ratio = select(select(1.0, after.depth_ratio, OWN_IS_NEXT), before.depth_ratio, OWN_IS_PREV);
     return SurfaceAround(trajectory_between(motion, before, after), depth_ratio);
 }
@@ -58,8 +54,8 @@ const BACKGROUND_RETURNS: f32 = 1.0;        // [px], see RETURNS
 /// The background at the centre of `px`, of these vectors and this depth, as the frames around show it.
 fn background_around(px: vec2i, motion: vec4f, z: f32) -> Background {
     var sum = Background(vec4f(0.0), 0.0);
-    if HAS_PREV { look(&sum, prev_color, prev_motion, prev_depth, prev_weight, px, motion.xy, z, false); }
-    if HAS_NEXT { look(&sum, next_color, next_motion, next_depth, next_weight, px, motion.zw, z, true); }
+    if HAS_PREV { look(&sum, px, motion.xy, z, false); }
+    if HAS_NEXT { look(&sum, px, motion.zw, z, true); }
     let is_seen = sum.count > 0.0;
     if HAS_FAR_PREV && !is_seen { look_far(&sum, px, motion, z, 0u, -2.0); }
     if HAS_FAR_NEXT && !is_seen { look_far(&sum, px, motion, z, select(0u, 1u, HAS_FAR_PREV), 2.0); }
@@ -96,8 +92,7 @@ fn look_far(sum: ptr<function, Background>, px: vec2i, motion: vec4f, z: f32, f:
 }
 
 /// Add what a neighbouring frame shows, if all of the 3 x 3 around the place is as deep as expected.
-fn look(sum: ptr<function, Background>, color_there: texture_2d<f32>, motion_there: texture_2d<f32>,
-        depth_there: texture_2d<f32>, weight_there: texture_2d<f32>, px: vec2i, step: vec2f, z: f32, is_next: bool) {
+fn look(sum: ptr<function, Background>, px: vec2i, step: vec2f, z: f32, is_next: bool) {
     let at = vec2f(px) + 0.5 + step;
     let is_inside = all(at >= vec2f(0.5)) && all(at <= vec2f(frame.size) - 0.5);
     let there = vec2i(clamp(at, vec2f(0.0), vec2f(frame.size) - 1.0));
@@ -105,44 +100,51 @@ fn look(sum: ptr<function, Background>, color_there: texture_2d<f32>, motion_the
     var i = 0;
     loop {
         let near = clamp(there + vec2i(i % 3, i / 3) - 1, vec2i(0), vec2i(frame.size) - 1);
-        let given = textureLoad(depth_there, near, 0).x;
+        let given = depth_there(near, is_next);
         let ratio = valid_depth(given) / z;
         is_clear = is_clear && given > 0.0 && ratio < BACKGROUND_DEPTH_RATIO && ratio > 1.0 / BACKGROUND_DEPTH_RATIO;
         i++;
         if !is_clear || i >= 9 { break; }
     }
-    let vectors = textureLoad(motion_there, there, 0);
+    let vectors = motion_there(there, is_next);
     let off = select(vectors.zw, vectors.xy, is_next) + step;
     var counts = 1.0;
-    if WEIGHTED { counts = interpolated(weight_there, at).x; }
+    if WEIGHTED { counts = weight_around(at, is_next); }
     if is_clear && counts > 0.5 && dot(off, off) < BACKGROUND_RETURNS * BACKGROUND_RETURNS {
-        (*sum).color += relit_background(color_there, at, is_next) / counts;
+        (*sum).color += color_around(at, is_next) / counts;
         (*sum).count += 1.0;
     }
 }
 
-/// Bilinear, for textures that samplers cannot filter.
-fn interpolated(image: texture_2d<f32>, at: vec2f) -> vec4f {
-    let corners = corners_of(at);
-    let above = mix(textureLoad(image, corners.xy, 0), textureLoad(image, corners.zy, 0), share_of(at).x);
-    let below = mix(textureLoad(image, corners.xw, 0), textureLoad(image, corners.zw, 0), share_of(at).x);
-    return mix(above, below, share_of(at).y);
-}
-
-/// The same of a neighbour's colours with their gains.
-fn relit_background(image: texture_2d<f32>, at: vec2f, is_next: bool) -> vec4f {
-    if !RELIT { return interpolated(image, at); }
+/// A neighbour's colour with its gains, bilinear, as samplers cannot filter what is read from storage.
+fn color_around(at: vec2f, is_next: bool) -> vec4f {
     let c = corners_of(at);
-    let above = mix(relit_texel(image, c.xy, is_next), relit_texel(image, c.zy, is_next), share_of(at).x);
-    let below = mix(relit_texel(image, c.xw, is_next), relit_texel(image, c.zw, is_next), share_of(at).x);
+    let above = mix(color_there(c.xy, is_next), color_there(c.zy, is_next), share_of(at).x);
+    let below = mix(color_there(c.xw, is_next), color_there(c.zw, is_next), share_of(at).x);
     return mix(above, below, share_of(at).y);
 }
 
-fn relit_texel(image: texture_2d<f32>, px: vec2i, is_next: bool) -> vec4f {
+fn color_there(px: vec2i, is_next: bool) -> vec4f {
+    var color = vec4f(0.0);
+    if is_next { color = textureLoad(next_color, px, 0); } else { color = textureLoad(prev_color, px, 0); }
+    if !RELIT { return color; }
     let k = px.y * i32(frame.size.x) + px.x;
     var gain = 0u;
     if is_next { gain = next_gains[k]; } else { gain = prev_gains[k]; }
-    return relit_color(textureLoad(image, px, 0), gain);
+    return relit_color(color, gain);
+}
+
+/// Its weight, bilinear.
+fn weight_around(at: vec2f, is_next: bool) -> f32 {
+    let c = corners_of(at);
+    let above = mix(weight_there(c.xy, is_next), weight_there(c.zy, is_next), share_of(at).x);
+    let below = mix(weight_there(c.xw, is_next), weight_there(c.zw, is_next), share_of(at).x);
+    return mix(above, below, share_of(at).y);
+}
+
+fn weight_there(px: vec2i, is_next: bool) -> f32 {
+    if is_next { return textureLoad(next_weight, px, 0).x; }
+    return textureLoad(prev_weight, px, 0).x;
 }
 
 /// The first and the last of the 2 x 2 pixels around a position [px], and how far it is from the first to the last.

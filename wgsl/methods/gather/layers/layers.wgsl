@@ -169,7 +169,8 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         (*split).back = edge.color / edge.counts;
     }
     if is_unfiltered(edge.px) { // vectors are those of the middles of pixels
-        (*split).front_motion = textureLoad(motion, nearest_front(edge), 0);
+        let nearest = nearest_front(edge);
+        (*split).front_motion = textureLoad(motion, nearest, 0);
         if edge.z >= edge.between { (*split).back_motion = edge.motion; }
     }
 }

@@ -12,10 +12,10 @@ struct RelitFrame {
 }
 
 @group(1) @binding(0) var<uniform> source: RelitFrame;
-@group(1) @binding(1) var color: texture_2d<f32>;               // of the neighbour, premultiplied by alpha and weight
+@group(1) @binding(1) var color: texture_2d<f32>;               // stored as given: of the neighbour, premultiplied by alpha and weight
 @group(1) @binding(2) var weight: texture_2d<f32>;
 @group(1) @binding(3) var front_surface: texture_2d<u32>;       // stored as rgba32uint: see pack_surface()
-@group(1) @binding(4) var own_color: texture_2d<f32>;           // of the frame itself
+@group(1) @binding(4) var own_color: texture_2d<f32>;           // of the frame itself, for samples between pixels
 @group(1) @binding(5) var own_weight: texture_2d<f32>;
 @group(1) @binding(6) var own_surface: texture_2d<u32>;         // stored as rgba32uint: before its edges are separated
 @group(1) @binding(7) var<storage, read> worklist: WorkList;
@@ -25,6 +25,7 @@ struct RelitFrame {
 @group(1) @binding(11) var relit: Color;                        // the neighbour's front layer
 @group(1) @binding(12) var<storage, read_write> gains: array<u32>;      // per pixel, see pack_gain(); all 0 at first
 @group(1) @binding(13) var linear: sampler;
+@group(1) @binding(14) var own_texels: texture_2d<f32>;         // stored as given: the same, for pixels
 
 struct HiddenList {     // squares of SQUARE x SQUARE pixels of the neighbour of which the frame does not show all
     count: atomic<u32>,
@@ -88,8 +89,7 @@ fn find_hidden(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
     let here = shown(px);
     if appears(px, here) { list_hidden(vec2u(px)); }
     let there = vec2i(here.at);
-    let change = abs(log_ratio(light(own_color, own_weight, there), light(color, weight, px)));
-    if here.is_there && max(max(change.x, change.y), change.z) > 2.0 * LEAST_CHANGE {
+    if here.is_there && differ(own_light(there), light_there(px), exp(2.0 * LEAST_CHANGE)) {
         atomicAdd(&changes[tile_index(px / i32(TILE))], 1u);
     }
 }
@@ -144,10 +144,23 @@ fn tile_index(tile: vec2i) -> i32 {
     return tile.y * i32(tiles_of(frame.size).x) + tile.x;
 }
 
-fn light(image: texture_2d<f32>, weights: texture_2d<f32>, px: vec2i) -> vec3f {
-    let found = max(textureLoad(image, px, 0).rgb, vec3f(0.0));
+/// The light of a pixel of the neighbour; of the frame itself.
+fn light_there(px: vec2i) -> vec3f {
+    let found = max(textureLoad(color, px, 0).rgb, vec3f(0.0));
     if !WEIGHTED { return found; }
-    return found / max(textureLoad(weights, px, 0).x, 1e-6);
+    return found / max(textureLoad(weight, px, 0).x, 1e-6);
+}
+
+fn own_light(px: vec2i) -> vec3f {
+    let found = max(textureLoad(own_texels, px, 0).rgb, vec3f(0.0));
+    if !WEIGHTED { return found; }
+    return found / max(textureLoad(own_weight, px, 0).x, 1e-6);
+}
+
+/// True if a colour's ratio of the two is beyond `most` or its inverse.
+fn differ(a: vec3f, b: vec3f, most: f32) -> bool {
+    let low = min(a, b) + LEAST_LIGHT;
+    return any(max(a, b) + LEAST_LIGHT > most * low);
 }
 
 fn log_ratio(a: vec3f, b: vec3f) -> vec3f {
@@ -245,7 +258,7 @@ fn add_light(sum: ptr<function, Light>, px: vec2i, own_at: vec2f, share: f32) {
     let place = own_at / vec2f(frame.size);
     var own = max(textureSampleLevel(own_color, linear, place, 0.0).rgb, vec3f(0.0));
     if WEIGHTED { own /= max(textureSampleLevel(own_weight, linear, place, 0.0).x, 1e-6); }
-    let there = light(color, weight, px);
+    let there = light_there(px);
     let change = log_ratio(own, there);
     (*sum).count += u32(share > 0.0);
     (*sum).total += share;

@@ -4,12 +4,13 @@
 //#include methods/gather/layers/around.wgsl
 //#include methods/gather/layers/edge_flags.wgsl
 
-@group(1) @binding(0) var color: texture_2d<f32>;       // of one frame, premultiplied by alpha and weight
+@group(1) @binding(0) var color: texture_2d<f32>;       // stored as given: of one frame, premultiplied by alpha and weight
 @group(1) @binding(3) var weight: texture_2d<f32>;
 @group(1) @binding(4) var edge_flags: texture_2d<u32>;  // stored as r32uint, by edges.wgsl: depth and flags
 
 fn color_at(px: vec2i) -> vec4f {
-    return textureLoad(color, clamped(px), 0);
+    let at = clamped(px);
+    return textureLoad(color, at, 0);
 }
 
 fn flags_at(px: vec2i) -> u32 {
@@ -163,14 +164,15 @@ fn sum_sides(edge: EdgePixel, around: Around) -> Sides {
         | (around.back & (around.pure | select(0u, ~0u, no_pure_background)));
     loop {
         let there = neighbour(edge.px, i32(min(firstTrailingBit(todo), 24u)), edge.between);
-        let motion_there = textureLoad(motion, clamped(there.at), 0);
-        let color_there = color_at(there.at);
+        let at = clamped(there.at);
+        let vectors = textureLoad(motion, at, 0);
+        let shown = color_at(at);
         // The farther away, the smaller the share.
         let share = select(0.0, 1.0 / (1.0 + there.distance2 * there.distance2), todo != 0u);
-        let weight_there = weight_at(there.at);
-        if todo != 0u && there.is_front { brightest = max(brightest, color_there / max(weight_there, 1e-9)); }
-        add(&front, select(0.0, share, there.is_front), motion_there, there.z, color_there, weight_there);
-        add(&back, select(share, 0.0, there.is_front), motion_there, there.z, color_there, weight_there);
+        let counts = weight_at(at);
+        if todo != 0u && there.is_front { brightest = max(brightest, shown / max(counts, 1e-9)); }
+        add(&front, select(0.0, share, there.is_front), vectors, there.z, shown, counts);
+        add(&back, select(share, 0.0, there.is_front), vectors, there.z, shown, counts);
         todo &= todo - 1u;
         if todo == 0u { break; }
     }
@@ -186,12 +188,14 @@ fn find_wire(sides: ptr<function, Sides>, edge: EdgePixel) {
     var most = 0.0;
     for (var i = 0; i < select(0, 9, (*sides).thin); i++) {
         let there = neighbour(edge.px, i % 3 + i / 3 * 5 + 6, edge.between);
-        let motion_there = textureLoad(motion, clamped(there.at), 0);
-        let difference2 = dot(motion_there - (*sides).back_motion, motion_there - (*sides).back_motion);
+        let at = clamped(there.at);
+        let vectors = textureLoad(motion, at, 0);
+        let difference = vectors - (*sides).back_motion;
+        let difference2 = dot(difference, difference);
         if there.counts && there.is_front && difference2 > most {
             most = difference2;
             (*sides).purest = there.at;
-            (*sides).front_motion = motion_there;
+            (*sides).front_motion = vectors;
         }
     }
 }

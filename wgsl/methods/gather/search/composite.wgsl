@@ -10,7 +10,6 @@
 @group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
 
 override WEIGHTED: bool = false;    // pixels have weights
-override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 
 const EDGE_WIDTH: f32 = 0.5;            // of edges between two texels, as a share of the motion from sample to sample,
 const LEAST_WIDTH: f32 = 0.667;         // and at least [px]; at 1, they are bilinear

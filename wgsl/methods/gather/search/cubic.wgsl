@@ -4,7 +4,7 @@
 //#include methods/gather/worklist.wgsl
 //#include methods/gather/surface.wgsl
 
-@group(1) @binding(0) var color: texture_2d<f32>;       // premultiplied by alpha and weight
+@group(1) @binding(0) var color: texture_2d<f32>;       // stored as given: premultiplied by alpha and weight
 @group(1) @binding(1) var front_surface: texture_2d<u32>;   // stored as rgba32uint: see pack_surface()
 @group(1) @binding(2) var second_differences: Differences;  // across, down, in half floats; 0 where not smooth
 @group(1) @binding(3) var<storage, read> worklist: WorkList;
@@ -14,7 +14,8 @@ const MOST_SLOPE: f32 = 4.0;    // from a texel to the next, as a multiple of th
 alias Differences = texture_storage_2d<rgba32uint, write>;
 
 fn color_at(px: vec2i) -> vec4f {
-    return textureLoad(color, clamp(px, vec2i(0), vec2i(frame.size) - 1), 0);
+    let at = clamp(px, vec2i(0), vec2i(frame.size) - 1);
+    return textureLoad(color, at, 0);
 }
 
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)

@@ -58,8 +58,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     if k >= worklist.count || any(id >= frame.size) { return; }
     let pixel = pixel_at(id);
     let front = 0u;
-    let starts = Starts(pixel.trajectory, surface_at(id, 0u), surface_at(id, 1u), surface_at(id, 2u), surface_at(id, 3u),
-                        surface_at(id, 4u), surface_at(id, 5u));
+    let starts = Starts(pixel.trajectory, surface_at(id, 1u), surface_at(id, 2u), surface_at(id, 3u), surface_at(id, 4u),
+                        surface_at(id, 5u));
     let block_trajectory = unpack_trajectory(surface_of(vec2i(pixel.block * BLOCK), front));  // as classified
     let is_static = is_static_pixel(pixel);
     let samples = select(pixel.times.count, 0u, is_static);

@@ -38,22 +38,35 @@ const TIMES_PER_WORD: u32 = 32u;
 struct Candidates {     // motions that may bring something of one frame into a tile, the nearest first
     header: vec4f,      // see CANDIDATE_LAYERS
     min_depth: vec4f,
-    times: vec4u,       // pairs of half floats: t_enter, t_exit, since that frame's instant [frame intervals]
-    velocities: vec4u,
-    half_accelerations: vec4u,
+    enters: vec4f,      // times since that frame's instant [frame intervals]
+    leaves: vec4f,
+    velocity_x: vec4f,
+    velocity_y: vec4f,
+    half_x: vec4f,      // half accelerations
+    half_y: vec4f,
 }
 
 fn load_candidates(tile: vec2u, f: u32) -> Candidates {
-    let none = vec4u(0u);
-    if f >= sources.count + sources.far_count { return Candidates(vec4f(0.0), vec4f(INFINITE), none, none, none); }
+    let zero = vec4f(0.0);
+    if f >= sources.count + sources.far_count { return Candidates(zero, vec4f(INFINITE), zero, zero, zero, zero, zero, zero); }
     let first = f * CANDIDATE_LAYERS;
+    let times = textureLoad(tile_candidates, tile, first + 2u, 0);
+    let velocities = textureLoad(tile_candidates, tile, first + 3u, 0);
+    let halves = textureLoad(tile_candidates, tile, first + 4u, 0);
     return Candidates(
         bitcast<vec4f>(textureLoad(tile_candidates, tile, first, 0)),
         bitcast<vec4f>(textureLoad(tile_candidates, tile, first + 1u, 0)),
-        textureLoad(tile_candidates, tile, first + 2u, 0),
-        textureLoad(tile_candidates, tile, first + 3u, 0),
-        textureLoad(tile_candidates, tile, first + 4u, 0),
+        firsts(times), seconds(times), firsts(velocities), seconds(velocities), firsts(halves), seconds(halves),
     );
+}
+
+/// The first half floats of four words.
+fn firsts(words: vec4u) -> vec4f {
+    return vec4f(unpack2x16float(words.x).x, unpack2x16float(words.y).x, unpack2x16float(words.z).x, unpack2x16float(words.w).x);
+}
+
+fn seconds(words: vec4u) -> vec4f {
+    return vec4f(unpack2x16float(words.x).y, unpack2x16float(words.y).y, unpack2x16float(words.z).y, unpack2x16float(words.w).y);
 }
 
 /// Those of frame `f`, `a` to `c` of the frame and its neighbours; those of others are rarely wanted.
@@ -67,13 +80,7 @@ fn candidates_of(tile: vec2u, f: u32, a: Candidates, b: Candidates, c: Candidate
 
 /// The candidates, a bit each, that may be in the tile at the time `u`.
 fn may_be_there(candidates: Candidates, u: f32) -> u32 {
-    let a = unpack2x16float(candidates.times.x);
-    let b = unpack2x16float(candidates.times.y);
-    let c = unpack2x16float(candidates.times.z);
-    let d = unpack2x16float(candidates.times.w);
-    let entered = vec4f(a.x, b.x, c.x, d.x) <= vec4f(u);
-    let is_left = vec4f(a.y, b.y, c.y, d.y) < vec4f(u);
-    return bits_of(entered & !is_left);
+    return bits_of((candidates.enters <= vec4f(u)) & (candidates.leaves >= vec4f(u)));
 }
 
 /// Those that may be nearer than `depth`.
@@ -94,13 +101,9 @@ struct Seeds {          // displacements to start from [px]
 
 /// The displacements by the time `u` along the candidate motions.
 fn seeds_at(candidates: Candidates, u: f32, pending: u32) -> Seeds {
-    let v = candidates.velocities;
-    let a = candidates.half_accelerations;
-    let p = (unpack2x16float(v.x) + unpack2x16float(a.x) * u) * u;
-    let q = (unpack2x16float(v.y) + unpack2x16float(a.y) * u) * u;
-    let r = (unpack2x16float(v.z) + unpack2x16float(a.z) * u) * u;
-    let s = (unpack2x16float(v.w) + unpack2x16float(a.w) * u) * u;
-    return Seeds(pending, vec4f(p.x, q.x, r.x, s.x), vec4f(p.y, q.y, r.y, s.y));
+    let x = (candidates.velocity_x + candidates.half_x * u) * u;
+    let y = (candidates.velocity_y + candidates.half_y * u) * u;
+    return Seeds(pending, x, y);
 }
 
 /// The first pending seed, which is pending no more.

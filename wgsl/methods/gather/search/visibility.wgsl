@@ -3,6 +3,7 @@
 //#include methods/gather/motion.wgsl
 //#include methods/gather/search/search.wgsl
 
+override CONFIDENCE: bool = false;  // show how sure the result is instead of it
 override CROWDED: bool = false;     // tiles are crowded: searches of front layers start from what is scattered too
 
 const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
@@ -18,13 +19,13 @@ const GOES_ON: f32 = 5.0;               // how far a surface is taken to go on b
 struct Sample {
     depth: f32,         // biased, for comparisons
     true_depth: f32,
-    residual2: f32,     // squared distance of its position from the pixel [px^2]
+    residual2: f32,     // squared distance of its position from the pixel [px^2]; 0 unless CONFIDENCE
     at: vec2f,          // in its frame [px]
     layer: u32,         // of `surfaces`
 }
 
 struct Cover {          // what a pixel's own layer may hide of other frames
-    z: f32,             // its depth, 0 if there is none
+    z: f32,             // its depth
     goes_on: bool,      // it is still there
 }
 
@@ -33,8 +34,7 @@ struct Visible {        // the nearest samples of each kind
     front_edge: Sample,
     back_edge: Sample,  // behind the front edge
     miss2: f32,         // least squared distance from the pixel at which a front layer's first search ended [px^2]
-    front_cover: Cover, // of the pixel's own layers
-    back_cover: Cover,
+    cover: Cover,       // of the pixel's own last layer
 }
 
 // The layers are searched in this order, each only if it may add anything: see next_search().
@@ -52,9 +52,7 @@ const SEARCHES: u32 = 8u;
 fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
                       a: Candidates, b: Candidates, c: Candidates) -> Visible {
     let has_edge = max(a.header.y, max(b.header.y, c.header.y)) > 0.0;
-    let front_cover = cover_at(x, starts.own_front, abs(unpack_depth(starts.own_front)), t);
-    let back_cover = cover_at(x, starts.own_back, back_depth_in(starts.own_back.w), t);
-    var visible = Visible(nothing(), nothing(), nothing(), INFINITE, front_cover, back_cover);
+    var visible = Visible(nothing(), nothing(), nothing(), INFINITE, cover_at(x, starts.own_back, t));
     var hidden = false;             // the front layer of the frame itself shows nothing opaque
     var search = OWN_FRONT;
     loop {
@@ -100,9 +98,8 @@ struct Query {          // what is searched, and where
 
 struct Starts {         // whose trajectories the first searches of a pixel start from, read once
     own: Trajectory5,
-    own_front: vec4u,   // what is at the pixel's place in the frame's own layers, see pack_surface()
-    own_back: vec4u,
-    front1: vec4u,      // and in those of neighbouring frames
+    own_back: vec4u,    // what is at the pixel's place in the frame's own back layer, see pack_surface()
+    front1: vec4u,      // and in the layers of neighbouring frames
     back1: vec4u,
     front2: vec4u,
     back2: vec4u,
@@ -211,13 +208,13 @@ fn record(visible: ptr<function, Visible>, query: Query, state: WarpState) {
     let z = select(depth_in(state.word), back_depth_in(state.word), is_back);
     let is_inferred = is_back && (state.word & SEEN) == 0u;
     let depth = abs(z) * query.handicap * select(1.0, INFERRED_DEPTH_BIAS, is_inferred);
-    let found = Sample(depth, abs(z), state.residual2, query.x - state.d, query.layer);
+    let found = Sample(depth, abs(z), select(0.0, state.residual2, CONFIDENCE), query.x - state.d, query.layer);
     // A silhouette of the frame's own is not found once more a frame interval away, where paths that bend are off.
     let t = query.u + offset_of(query.layer / 2u);
     let front_edge_z = (*visible).front_edge.true_depth;
     let is_own = z < 0.0 || (abs(t) < OWN_TIME && found.true_depth < front_edge_z * BODY_DEPTH_RATIO);
     let is_again = query.layer > 1u && (*visible).front_edge.layer < 2u && is_own;
-    let is_still_covered = query.layer > 1u && is_covered((*visible).front_cover, (*visible).back_cover, found.true_depth);
+    let is_still_covered = query.layer > 1u && is_covered((*visible).cover, found.true_depth);
     let counts = !is_still_covered && (!(is_far(query.layer) || is_again) || is_hidden(found));
     if counts && z > 0.0 && found.depth < (*visible).opaque.depth { (*visible).opaque = found; }
     if counts && z < 0.0 {
@@ -248,23 +245,23 @@ fn is_complement(found: Sample) -> bool {
     return (front & (SINGLE | BY_COLOR)) == BY_COLOR;
 }
 
-/// A pixel's own surface at depth `z` by the time `t`: where what is at the pixel then is behind something nearer in the frame, nobody
-/// sees if the surface has ended, and it is taken to go on, near the frame's own instant and place.
-fn cover_at(x: vec2f, surface: vec4u, z: f32, t: f32) -> Cover {
+/// A pixel's own surface by the time `t`: where what is at the pixel then is behind something nearer in the frame, nobody sees if the
+/// surface has ended, and it is taken to go on, near the frame's own instant and place.
+fn cover_at(x: vec2f, surface: vec4u, t: f32) -> Cover {
+    let z = abs(unpack_depth(surface));
     let at = x - displacement_of(surface, t);
     let nearer = abs(unpack_depth(surface_of(vec2i(nearest_pixel(at)), 0u)));
     let is_near = abs(t) < TRUSTED_TIME && distance(at, x) < GOES_ON && is_inside(at);
     return Cover(z, is_near && nearer * BODY_DEPTH_RATIO < z);
 }
 
-/// True if a sample of another frame at the depth `z` is behind a pixel's own surface that goes on: behind the back if it is before it.
-fn is_covered(front: Cover, back: Cover, z: f32) -> bool {
-    let by_back = back.z > 0.0 && back.z * BODY_DEPTH_RATIO < z;
-    return select(front.goes_on && front.z * BODY_DEPTH_RATIO < z, back.goes_on, by_back);
+/// True if a sample of another frame at the depth `z` is behind a pixel's own surface that goes on.
+fn is_covered(cover: Cover, z: f32) -> bool {
+    return cover.goes_on && cover.z * BODY_DEPTH_RATIO < z;
 }
 
 fn nothing() -> Sample {
-    return Sample(INFINITE, INFINITE, INFINITE, vec2f(-9.0), 99u);
+    return Sample(INFINITE, INFINITE, 0.0, vec2f(-9.0), 99u);
 }
 
 /// True if `b` is of another surface, behind that of `a`; neighbouring frames show the same one again.
