@@ -294,6 +294,33 @@ def test_colours_tell_coverage_if_neither_alpha_nor_vectors_do():
     assert told["disocclusion"].max() > 0.2
 
 
+def hemmed(t):
+    """A bright body with a dark hem, 9 px a frame, before a wall that is as dark beside the hem."""
+    x = np.arange(64) + np.zeros((24, 1))
+    is_whole = (abs(np.arange(24) - 11.5) < 3)[:, None]  # the hem fills its pixels in these rows
+    left, right = 20.5 + 9 * t, np.where(is_whole, 44, 44.5) + 9 * t
+
+    def share(low, high):
+        return np.clip(np.minimum(x + 1, high) - np.maximum(x, low), 0, 1)
+
+    body, hem = share(left, right - 1), share(right - 1, right)
+    cover = body + hem
+    tone = 0.9 * body + 0.3 * hem + np.where(abs(x - 45) < 5, 0.2, 0.7) * (1 - cover)
+    motion = cover[..., None] * np.array([-9, 0, 9, 0], "f4")
+    depth = np.where(cover >= 0.5, 5.0, 9.0).astype("f4")
+    color = np.dstack([tone] * 3 + [np.ones_like(tone)])
+    return color.astype("f4"), motion.astype("f4"), depth
+
+
+def test_vectors_tell_that_a_hem_is_of_its_body():
+    """Its colour is near the wall's: with a coverage of 0.14, the sum of errors was 0.11."""
+    shutter = Shutter(360)
+    times = shutter.sample_times(64).astype(float)
+    truth = np.mean([hemmed(t)[0] for t in times], axis=0)
+    got = wgmb.Blur("gather", shutter=shutter)(frame_of([hemmed(t) for t in (0, -1, 1)]))
+    assert abs(got - truth)[12, 36:, 0].sum() < 0.09
+
+
 def waves(t):
     """Bright waves that pass by at 3 px a frame, dark in between."""
     y, x = np.mgrid[:40, :80] + 0.5

@@ -332,7 +332,7 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
         coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
     elif is_exact or not any(0.1 < share < 0.9 for share in shares):
         at_middle = float(z[y, x] < between) if is_exact else coverage
-        beyond = 0 if is_exact else 0.4
+        beyond = 0 if is_exact or way @ way < 16**2 else 0.4
         coverage, told = coverage_by_color(
             color[y, x], mean(color, front), back_color, at_middle, beyond
         )

@@ -169,7 +169,7 @@ HARD_NOTES = """
   moves over the ground. At 360° it halves the FLIP of `shadows`, and gains 7 dB. The checkered box
   in the mirror of `reflections` moves by more than its own pattern and stays too sharp.
 * `slant`: no shadow moves, and the search for one costs nothing, nor does it in `car`. `glass`
-  gains 0.0002 FLIP at 180° and 0.0019 at 360°; `reflections` gains 0.5 dB at 180° and loses
+  gains 0.0001 FLIP at 180° and 0.0018 at 360°; `reflections` gains 0.5 dB at 180° and loses
   0.0002 FLIP.
 * `--shading frames`, without the passes, gains most of this in `shadows`, a third to a half of it
   in `beginner`, and loses in `reflections`.

@@ -6,7 +6,8 @@
 //#include methods/gather/layers/sides.wgsl
 
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
-const BEYOND_HALF: f32 = 0.4;   // how far a colour leads beyond one half, against vectors that are means over their pixels
+const BEYOND_HALF: f32 = 0.4;   // how far a colour leads beyond one half, against vectors that are means over their pixels,
+const FAST_APART: f32 = 16.0;     // where front and back move apart by this, both ways together: vectors that bend vary too [px]
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour or vector from the line between two, as a share of its length
@@ -27,19 +28,19 @@ fn measured_coverage(edge: EdgePixel, sides: Sides, axis: vec4f, background: vec
     let unfiltered = is_unfiltered(edge.px);
     if !by_alpha && edge.counts > 0.0 && (unfiltered || !are_filtered(edge.px, sides.back_motion, axis)) {
         measured = coverage_by_color(edge, sides, background,
-                                     select(measured.share, f32(edge.z < edge.between), unfiltered));
+                                     select(measured.share, f32(edge.z < edge.between), unfiltered),
+                                     select(0.0, BEYOND_HALF, !unfiltered && dot(axis, axis) >= FAST_APART * FAST_APART));
     }
     measured.share = round(measured.share * f32(WHOLE)) / f32(WHOLE);
     return measured;
 }
 
-/// The same where vectors and depths are of the middles of pixels: by the colour, over or under one half, as that middle says. Where vectors
-/// are means, though here of one surface, that half is no strict limit. If the colour does not tell, a middle in front covers its pixel; one
-/// behind is covered as far as the pixels around are in front, or as little as the colour may be of the front.
-fn coverage_by_color(edge: EdgePixel, sides: Sides, background: vec4f, at_middle: f32) -> Coverage {
+/// The same where vectors and depths are of the middles of pixels: by the colour, over or under one half, as that middle says,
+/// or up to `beyond` that half. If the colour does not tell, a middle in front covers its pixel; one behind is covered as far as the
+/// pixels around are in front, or as little as the colour may be of the front.
+fn coverage_by_color(edge: EdgePixel, sides: Sides, background: vec4f, at_middle: f32, beyond: f32) -> Coverage {
     let front = sides.front.color / max(sides.front.weight, 1e-9);
     let place = place_between(edge.color / edge.counts, front, background);
-    let beyond = select(BEYOND_HALF, 0.0, is_unfiltered(edge.px));
     let least = select(0.0, 0.5 - beyond, at_middle >= 0.5);
     if place.is_told { return Coverage(clamp(place.share, least, least + 0.5 + beyond), false); }
     if at_middle >= 0.5 { return Coverage(at_middle, false); }
