@@ -7,7 +7,6 @@ import wgpu
 
 from .. import gpu
 from ..exposure import Cell, evened
-from ..flow import Shot
 from ..flow.dis import DisShot
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
@@ -18,10 +17,10 @@ from .changing_light import ChangingLight, Surroundings, shares_of
 from .holdouts import Holdout
 from .motion import VideoMotion
 from .planes import Planes
+from .ragged import KEPT
 from .thumbnail import Thumbnail
 
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
-_FRAMES = 3  # with motion: a frame and its neighbours
 
 
 class VideoFrames:
@@ -99,7 +98,7 @@ class VideoFrames:
         motion, depth = found or (None, None)
         holdout = self._held_out(index) if found else None
         made = FrameViews(color=light, motion=motion, depth=depth, holdout=holdout, key=object())
-        while len(self._frames) >= _FRAMES:
+        while len(self._frames) >= KEPT:
             self._frames.pop(next(iter(self._frames)))
         self._frames[index] = made
         return made
@@ -123,26 +122,14 @@ class VideoFrames:
         """Motion of a picture within its own interval of time, and depth if the method reads it."""
         if self._source is None:
             return None
-        factors, shot = self._factors(index), self._source.shot(index)
-        if isinstance(shot, Shot):
-            textures = shot.textures(index)
-            if textures is None:
-                return None
-            motion = textures.motion
-            if factors != (1.0, 1.0):
-                motion = self._paced(motion, index, factors)
-            return motion.create_view(), textures.depth.create_view()
-        arrays = shot(index)
-        if arrays is None:
+        textures = self._source.textures(index)
+        if textures is None:
             return None
-        motion, depth = arrays
+        motion, depth = textures
+        factors = self._factors(index)
         if factors != (1.0, 1.0):
-            motion = motion * np.repeat(factors, 2).astype(np.float32)
-        place = index % _FRAMES
-        return (
-            self._images.upload(f"motion {place}", motion, "rgba32float"),
-            None if depth is None else self._images.upload(f"depth {place}", depth, "r32float"),
-        )
+            motion = self._paced(motion, index, factors)
+        return motion.create_view(), None if depth is None else depth.create_view()
 
     def _held_out(self, index: int) -> View | None:
         """Mask of what stays sharp in a picture."""
@@ -150,7 +137,7 @@ class VideoFrames:
         if plane is None:
             return None
         if plane is not self._holdout.mask:
-            return self._images.upload(f"display {index % _FRAMES}", plane, texel)
+            return self._images.upload(f"display {index % KEPT}", plane, texel)
         if self._mask is None:
             self._mask = self._images.upload("holdout", plane, texel)
         return self._mask
@@ -167,7 +154,7 @@ class VideoFrames:
     ) -> wgpu.GPUTexture:
         """A copy of a motion, multiplied."""
         size = motion.size[0], motion.size[1]
-        output = self._images.texture(f"motion {index % _FRAMES}", size, "rgba32float")
+        output = self._images.texture(f"motion {index % KEPT}", size, "rgba32float")
         file = "video/gpu_frames.wgsl"
         encoder = self._device.create_command_encoder(label="pace")
         gpu.kernel(self._device, file).run(

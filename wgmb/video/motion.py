@@ -6,17 +6,19 @@ from typing import Any
 
 import wgpu
 
-from ..flow import Flow
+from ..flow import Flow, Shot
+from ..flow.dis import Dis
 from ..flow.dis.better_match import BetterMatch, Both
 from ..gpu.textures import TexturePool
-from ..shots.motion import MotionSource, ShotMotion
+from ..shots.motion import Found, MotionSource, ShotMotion
 from ..shots.reader import ShotReader
 from .planes import Planes
+from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
 
 
 class VideoMotion(ShotMotion):
-    """The motion of the pictures that a ShotReader keeps, by their indices there.
+    """The motion of the pictures that a ShotReader keeps, by their indices there, nowhere ragged.
 
     Flow takes them as textures of `device`, in light that is not expanded; BetterMatch also as
     grey, and others as grey alone.
@@ -33,6 +35,47 @@ class VideoMotion(ShotMotion):
         pictures = {Flow: searched.texture, BetterMatch: searched.both}
         picture = pictures.get(type(source), searched.grey)
         super().__init__(source, picture, shots.moves_on, depth)
+        self._device, self._images = device, TexturePool(device)
+        is_searched = not isinstance(source, Dis)  # dense inverse search alone is smooth
+        self._ragged = RaggedMotion(device) if is_searched else None
+
+    def textures(self, index: int) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture | None] | None:
+        """Motion and depth of a picture on the GPU, valid as RaggedMotion says.
+
+        None where it is alone; the depth may lack where none is wanted.
+        """
+        shot = self.shot(index)
+        if isinstance(shot, Shot):
+            textures = shot.textures(index)
+            if textures is None:
+                return None
+            motion, depth = textures.motion, textures.depth
+        else:
+            found = shot(index)
+            if found is None:
+                return None
+            place = 0 if self._ragged else index % KEPT
+            motion = self._images.upload(f"motion {place}", found[0], "rgba32float").texture
+            depth = None
+            if found[1] is not None:
+                depth = self._images.upload(f"depth {place}", found[1], "r32float").texture
+        return self._ragged(index, motion, depth) if self._ragged else (motion, depth)
+
+    def __call__(self, number: int) -> Found | None:
+        """Motion (height, width, 4) [px] and depth of a picture; None where it is alone."""
+        if self._ragged is None:
+            return super().__call__(number)
+        textures = self.textures(number)
+        if textures is None:
+            return None
+        motion, depth = (
+            None
+            if texture is None
+            else self._images.download(self._device.create_command_encoder(), texture)
+            for texture in textures
+        )
+        assert motion is not None
+        return motion, None if depth is None else depth[..., 0]
 
 
 class _Searched:
