@@ -662,7 +662,7 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     behind = hidden and any(tiles[f]["edges"] for f in near)
     if behind:
         search_layer(0, True, None, None)
-    if len(order) > 1 and ((hidden and not is_complement(layers[0], seen[0])) or abs(t) > 0.25):
+    if len(order) > 1 and ((hidden and not is_complement(layers[0], seen[0], t)) or abs(t) > 0.25):
         search_front(order[1])
         if len(order) > 2 and inferred():
             search_front(order[2])
@@ -675,13 +675,16 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     return seen, min(misses)
 
 
-def is_complement(own, found):
-    """True if a back of the frame itself makes up a colour with a front of uncertain coverage."""
+def is_complement(own, found, t):
+    """True if a back of the frame itself makes up a colour with a front of uncertain coverage.
+
+    Until the time `t` that front has moved by less than 2 px.
+    """
     if (found.frame, found.back) != (0, True):
         return False
     height, width = own.edgeless.shape
     i, j = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
-    return own.by_color[j, i]
+    return own.by_color[j, i] and np.hypot(*moved(own.trajectory[0][j, i], t)) < 2
 
 
 def is_hidden(own, frame, found):

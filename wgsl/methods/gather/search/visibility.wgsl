@@ -15,6 +15,7 @@ const BODY_DEPTH_RATIO: f32 = 1.3;      // of depths close together on one body:
 const OWN_TIME: f32 = 0.0625;           // up to here from its instant, the frame itself is surer of the surface of a silhouette [frame intervals]
 const NEIGHBOUR_RESIDUAL: f32 = 0.5;    // MAX_RESIDUAL of other frames' samples: what turns away from edge on is wide there
 const GOES_ON: f32 = 5.0;               // how far a surface is taken to go on behind something nearer [px]
+const GONE: f32 = 2.0;                  // a front that has moved as far from its pixel shows the background there [px]
 
 struct Sample {
     depth: f32,         // biased, for comparisons
@@ -80,7 +81,7 @@ fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool
     let try_neighbours_back = try_back && inferred && (none || visible.front_edge.depth >= INFINITE);
     var next = last + 1u;
     if next == OWN_BACK && !try_back { next = NEIGHBOUR_FRONT; }
-    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && ((hidden && !is_complement(visible.opaque)) || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
+    if next == NEIGHBOUR_FRONT && !(sources.count > 1u && ((hidden && !is_complement(visible.opaque, t)) || abs(t) > TRUSTED_TIME)) { next = SEARCHES; }
     if next == OTHER_FRONT && !(sources.count > 2u && inferred) { next = FAR_FRONT; }
     if next == FAR_FRONT && !(FAR && none) { next = NEIGHBOUR_BACK; }
     if next == OTHER_FAR && !(sources.far_count > 1u && none) { next = NEIGHBOUR_BACK; }
@@ -238,11 +239,11 @@ fn is_hidden(found: Sample) -> bool {
 }
 
 /// True if this is a back layer of the frame itself which makes up the colour of its pixel with a front of uncertain coverage: no other
-/// background does.
-fn is_complement(found: Sample) -> bool {
+/// background does, until that front has gone.
+fn is_complement(found: Sample, t: f32) -> bool {
     if found.layer != OWN_BACK { return false; }
-    let front = surface_of(vec2i(nearest_pixel(found.at)), OWN_FRONT).w;
-    return (front & (SINGLE | BY_COLOR)) == BY_COLOR;
+    let front = surface_of(vec2i(nearest_pixel(found.at)), OWN_FRONT);
+    return (front.w & (SINGLE | BY_COLOR)) == BY_COLOR && length(displacement_of(front, t)) < GONE;
 }
 
 /// A pixel's own surface by the time `t`: where what is at the pixel then is behind something nearer in the frame, nobody sees if the
