@@ -332,7 +332,8 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
         coverage = np.clip((color[y, x, 3] - clear) / (opaque - clear), 0, 1)
     elif is_exact or not any(0.1 < share < 0.9 for share in shares):
         at_middle = float(z[y, x] < between) if is_exact else coverage
-        beyond = 0 if is_exact or way @ way < 16**2 else 0.4
+        apart, bent = np.linalg.norm(way), np.linalg.norm(way[:2] + way[2:])
+        beyond = 0.4 if not is_exact and apart >= 16 and bent < 0.1 * apart else 0
         coverage, told = coverage_by_color(
             color[y, x], mean(color, front), back_color, at_middle, beyond
         )

@@ -24,11 +24,11 @@ class Bends:
             around = {"prev": by_offset.get(frame.offset - 1),
                       "next": by_offset.get(frame.offset + 1)}  # fmt: skip
             others = {
-                f"{side}_{name}": getattr(other, name, inputs.unbound)
+                f"{side}_{name}": getattr(other, name, None) or inputs.unbound
                 for side, other in around.items()
                 for name in ("motion", "depth")
             }
-            read = others | {"motion": frame.motion, "depth": frame.depth}
+            read = others | {"motion": frame.motion, "depth": frame.depth or inputs.unbound}
             texels = {name: gpu.stored(view) for name, view in read.items()}
             kernel = gpu.kernel(self._device, "methods/five_positions.wgsl", texels)
             kernel.run(encoder, "main", inputs.bindings, bends=bends, **read)

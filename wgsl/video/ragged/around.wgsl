@@ -1,4 +1,5 @@
 // Pixels around one: those outside are the nearest ones inside.
+//#include common/frame.wgsl
 
 const RADIUS: i32 = 2;  // of the rows and columns in which motion is measured [px]
 

@@ -7,7 +7,8 @@
 
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const BEYOND_HALF: f32 = 0.4;   // how far a colour leads beyond one half, against vectors that are means over their pixels,
-const FAST_APART: f32 = 16.0;     // where front and back move apart by this, both ways together: vectors that bend vary too [px]
+const FAST_APART: f32 = 16.0;     // where front and back move apart by this, both ways together [px],
+const MOST_BENT: f32 = 0.1;       // and bend by no more than this share of it: vectors that bend vary too
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage
 const OFF_AXIS: f32 = 0.25;     // distance of a mixed colour or vector from the line between two, as a share of its length
@@ -29,7 +30,7 @@ fn measured_coverage(edge: EdgePixel, sides: Sides, axis: vec4f, background: vec
     if !by_alpha && edge.counts > 0.0 && (unfiltered || !are_filtered(edge.px, sides.back_motion, axis)) {
         measured = coverage_by_color(edge, sides, background,
                                      select(measured.share, f32(edge.z < edge.between), unfiltered),
-                                     select(0.0, BEYOND_HALF, !unfiltered && dot(axis, axis) >= FAST_APART * FAST_APART));
+                                     select(0.0, BEYOND_HALF, !unfiltered && is_fast_and_straight(axis)));
     }
     measured.share = round(measured.share * f32(WHOLE)) / f32(WHOLE);
     return measured;
@@ -80,4 +81,10 @@ fn place_between(own: vec4f, front: vec4f, back: vec4f) -> ColorPlace {
     let off2 = dot(off, off);
     let is_told = length2 > LEAST_CONTRAST * LEAST_CONTRAST && off2 < OFF_AXIS * OFF_AXIS * length2;
     return ColorPlace(share, is_told, way / max(length2 + off2, 1e-12));
+}
+
+/// True if two surfaces move apart fast, and by the same before and after the frame.
+fn is_fast_and_straight(axis: vec4f) -> bool {
+    let apart = length(axis);
+    return apart >= FAST_APART && length(axis.xy + axis.zw) < MOST_BENT * apart;
 }
