@@ -105,6 +105,10 @@ class TexturePool:
             views[key] = texture.create_view(**options)
         return views[key]
 
+    def layer(self, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
+        """One layer of an array texture of this pool, as a texture of its own."""
+        return self.view_of(texture, dimension="2d", base_array_layer=index, array_layer_count=1)
+
     def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
         """Put `image` (height, width[, channels]) into the texture called `name`."""
         height, width = image.shape[:2]

@@ -11,7 +11,6 @@ import wgpu
 from ... import gpu
 from ...gpu import wgsl
 from ...gpu.textures import ScratchBuffer, TexturePool
-from .layers.layers import layer_view
 from .shading import Added
 from .tiles.active_tiles import grid_of, uniform
 
@@ -154,7 +153,7 @@ class Search:
             inputs.bindings,
             cells,
             color=inputs.frame.color,
-            front_surface=layer_view(self._images, surfaces, 0),
+            front_surface=self._images.layer(surfaces, 0),
             second_differences=differences,
             worklist=cells,
         )

@@ -12,11 +12,6 @@ from .edges import Edges
 from .relight import Relight
 
 
-def layer_view(images: TexturePool, texture: wgpu.GPUTexture, index: int) -> wgpu.GPUTextureView:
-    """One layer of an array texture of the pool, as a texture of its own."""
-    return images.view_of(texture, dimension="2d", base_array_layer=index, array_layer_count=1)
-
-
 class Layers:
     """The layers of up to three frames, each in a slot: its index among the inputs.
 
@@ -32,11 +27,11 @@ class Layers:
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
         """The foreground's surfaces of the frame in a slot."""
-        return layer_view(self._images, self.textures["surfaces"], 2 * slot)
+        return self._images.layer(self.textures["surfaces"], 2 * slot)
 
     def _front_colors(self, slot: int) -> wgpu.GPUTextureView:
         """The foreground's colours of the frame in a slot."""
-        return layer_view(self._images, self.textures["layer_colors"], 2 * slot)
+        return self._images.layer(self.textures["layer_colors"], 2 * slot)
 
     def _views(self, slot: int) -> dict[str, wgpu.GPUTextureView]:
         """The layers in a slot, by the names of their bindings."""
@@ -49,7 +44,7 @@ class Layers:
         return {
             "colors": both(self.textures["layer_colors"]),
             "surfaces": both(self.textures["surfaces"]),
-            "mattes": layer_view(self._images, self.textures["mattes"], slot),
+            "mattes": self._images.layer(self.textures["mattes"], slot),
         }
 
     def _far(self, inputs, offset: int) -> dict[str, wgpu.GPUTextureView]:

@@ -201,19 +201,13 @@ class MovingLight:
                     over=over,
                     node=stage.uniform("compose", "Node", time=share),
                     before=changed.get(side, none) if entry == "add_neighbour" else before,
-                    earlier=none if earlier is None else self._layer(earlier, i),
-                    added=self._layer(result, i),
+                    earlier=none if earlier is None else self._images.layer(earlier, i),
+                    added=self._images.layer(result, i),
                     range=range,
                     range_out=range_out,
                     **both,
                 )
         return result
-
-    def _layer(self, texture: wgpu.GPUTexture, index: int) -> View:
-        """One layer of an array texture, as a texture of its own."""
-        return self._images.view_of(
-            texture, dimension="2d", base_array_layer=index, array_layer_count=1
-        )
 
 
 def _carry(stage: Stage, darkness: View, ways: Mapping[int, LightFlow], times: LightTimes) -> None:
