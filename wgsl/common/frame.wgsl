@@ -20,6 +20,11 @@ const WG_X: u32 = 32u;
 const WG_Y: u32 = 2u;
 const INTERLEAVE: u32 = 16u;    // rows of workgroups from one to the next of a swizzled dispatch
 
+/// A pixel, or outside of the image the nearest one inside.
+fn inside(px: vec2i) -> vec2i {
+    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
+}
+
 /// The pixel of an invocation, swizzled, for passes whose pixels differ in cost. A software driver gives every
 /// core one stretch of the workgroups: interleaved rows spread each stretch over the image. It works on
 /// eight invocations at once, as long as the slowest takes: these are blocks of 4 x 2 pixels, which cross fewer

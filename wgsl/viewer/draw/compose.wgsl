@@ -63,21 +63,21 @@ fn texel(@builtin(position) at: vec4f) -> @location(0) vec4f {
 
 /// Display values of the pixel whose centre is `at`.
 fn shown(at: vec2f) -> vec3f {
-    if !inside(at, view.area) { return BACKGROUND; }
+    if !is_in(at, view.area) { return BACKGROUND; }
     let has_key = FIRST == DEPTH || COMPARE == ERROR || (FIRST == COLOR && TONE == FALSE);
-    if has_key && inside(at, view.key) { return color_bar(at); }
+    if has_key && is_in(at, view.key) { return color_bar(at); }
     let color = comparison(at);
     if FIRST != MOTION { return color; }
-    return select(color, wheel(at, color), inside(at, view.wheel));
+    return select(color, wheel(at, color), is_in(at, view.wheel));
 }
 
-fn inside(at: vec2f, box: vec4f) -> bool {
+fn is_in(at: vec2f, box: vec4f) -> bool {
     return all(at >= box.xy) && all(at < box.xy + box.zw);
 }
 
 fn comparison(at: vec2f) -> vec3f {
     if COMPARE == SPLIT { return side_by_side(at); }
-    if !inside(at, view.place) { return BACKGROUND; }
+    if !is_in(at, view.place) { return BACKGROUND; }
     let uv = (at - view.place.xy) / view.place.zw;
     if COMPARE == WIPE {
         if abs(at.x - view.line) < view.thick { return vec3f(0.95); }

@@ -80,7 +80,7 @@ fn look_far(sum: ptr<function, Background>, px: vec2i, motion: vec4f, z: f32, f:
     var counts = 0.0;
     for (var i = 0; i < select(0, 4, is_inside && is_same); i++) {
         let near = vec2i(i % 2, i / 2);
-        let texel = clamp(vec2i(corner) + near, vec2i(0), vec2i(frame.size) - 1);
+        let texel = inside(vec2i(corner) + near);
         let shares = mix(1.0 - share, share, vec2f(near));
         color += shares.x * shares.y * textureLoad(far_layer_colors, texel, 2u * f, 0);
         counts += shares.x * shares.y * unpack_matte(textureLoad(far_mattes, texel, f, 0), WEIGHTED).weight;
@@ -99,7 +99,7 @@ fn look(sum: ptr<function, Background>, px: vec2i, step: vec2f, z: f32, is_next:
     var is_clear = is_inside;
     var i = 0;
     loop {
-        let near = clamp(there + vec2i(i % 3, i / 3) - 1, vec2i(0), vec2i(frame.size) - 1);
+        let near = inside(there + vec2i(i % 3, i / 3) - 1);
         let given = depth_there(near, is_next);
         let ratio = valid_depth(given) / z;
         is_clear = is_clear && given > 0.0 && ratio < BACKGROUND_DEPTH_RATIO && ratio > 1.0 / BACKGROUND_DEPTH_RATIO;

@@ -59,7 +59,7 @@ fn is_mixture(own: vec4f, axis: vec4f) -> bool {
 fn are_filtered(px: vec2i, back: vec4f, axis: vec4f) -> bool {
     var result = false;
     for (var i = 0; i < 9; i++) {
-        let near = clamped(px + vec2i(i % 3, i / 3) - 1);
+        let near = inside(px + vec2i(i % 3, i / 3) - 1);
         let share = dot(textureLoad(motion, near, 0) - back, axis) / dot(axis, axis);
         result = result || abs(share - 0.5) < BETWEEN;
     }

@@ -9,12 +9,8 @@ const EDGE: u32 = 1u;           // the last two bits of a depth: the pixel may s
 const SLOW: u32 = 2u;           // and they hardly move apart while the shutter is open
 const EDGE_MOTION: f32 = 0.5;   // difference of the motions of different surfaces [px]
 
-fn clamped(px: vec2i) -> vec2i {
-    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
-}
-
 fn depth_at(px: vec2i) -> f32 {
-    let at = clamped(px);
+    let at = inside(px);
     return valid_depth(textureLoad(depth, at, 0).x);
 }
 

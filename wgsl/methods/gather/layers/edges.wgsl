@@ -47,7 +47,7 @@ fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_
     let apart = nearest * (SURFACE_DEPTH_RATIO * SURFACE_DEPTH_RATIO - 1.0);   // the 3 x 3 is two pixels from side to side
     let count = select(0, 9, beyond > LEAST_SHARE * apart);
     for (var i = 0; i < count; i++) {
-        let near = clamped(px + vec2i(i % 3, i / 3) - 1);
+        let near = inside(px + vec2i(i % 3, i / 3) - 1);
         let difference = textureLoad(motion, near, 0) - own;
         let row = select(select(below, here, i < 6), above, i < 3);
         let is_same = (row[i % 3] < between) == is_front;
@@ -81,10 +81,10 @@ fn is_ramp(px: vec2i, wanted: bool) -> bool {
     var result = false;
     for (var i = 0; i < select(0, 2, wanted); i++) {
         let along = vec2i(1 - i, i);
-        let just_before = clamped(px - along);
-        let just_after = clamped(px + along);
-        let far_before = clamped(px - 3 * along);
-        let far_after = clamped(px + 3 * along);
+        let just_before = inside(px - along);
+        let just_after = inside(px + along);
+        let far_before = inside(px - 3 * along);
+        let far_after = inside(px + 3 * along);
         let low = textureLoad(motion, just_before, 0);
         let high = textureLoad(motion, just_after, 0);
         let change = high - low;

@@ -69,12 +69,12 @@ fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(work
 
 /// True if there is an edge in the 3 x 3, where flags say so; and if one is separated. All are, but in some tiles.
 fn edges_beside(px: vec2i) -> vec2<bool> {
-    let low = clamped(px - 1);
-    let high = clamped(px + 1);
+    let low = inside(px - 1);
+    let high = inside(px + 1);
     let around = around_tile(low) | around_tile(high) | around_tile(vec2i(low.x, high.y)) | around_tile(vec2i(high.x, low.y));
     var result = vec2<bool>(around == 0u);
     for (var i = 0; i < select(9, 0, around == 0u); i++) {
-        let at = clamped(px + vec2i(i % 3, i / 3) - 1);
+        let at = inside(px + vec2i(i % 3, i / 3) - 1);
         let flags = flags_at(at);
         result = result | vec2<bool>(is_visible_edge(flags, around_tile(at)), is_separated(flags, around_tile(at)));
     }

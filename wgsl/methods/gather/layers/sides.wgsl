@@ -9,18 +9,18 @@
 @group(1) @binding(4) var edge_flags: texture_2d<u32>;  // stored as r32uint, by edges.wgsl: depth and flags
 
 fn color_at(px: vec2i) -> vec4f {
-    let at = clamped(px);
+    let at = inside(px);
     return textureLoad(color, at, 0);
 }
 
 fn flags_at(px: vec2i) -> u32 {
-    let at = clamped(px);
+    let at = inside(px);
     return textureLoad(edge_flags, at, 0).x;
 }
 
 fn weight_at(px: vec2i) -> f32 {
     if !WEIGHTED { return 1.0; }
-    return textureLoad(weight, clamped(px), 0).x;
+    return textureLoad(weight, inside(px), 0).x;
 }
 
 struct EdgePixel {      // a pixel that may show two surfaces
@@ -164,7 +164,7 @@ fn sum_sides(edge: EdgePixel, around: Around) -> Sides {
         | (around.back & (around.pure | select(0u, ~0u, no_pure_background)));
     loop {
         let there = neighbour(edge.px, i32(min(firstTrailingBit(todo), 24u)), edge.between);
-        let at = clamped(there.at);
+        let at = inside(there.at);
         let vectors = textureLoad(motion, at, 0);
         let shown = color_at(at);
         // The farther away, the smaller the share.
@@ -188,7 +188,7 @@ fn find_wire(sides: ptr<function, Sides>, edge: EdgePixel) {
     var most = 0.0;
     for (var i = 0; i < select(0, 9, (*sides).thin); i++) {
         let there = neighbour(edge.px, i % 3 + i / 3 * 5 + 6, edge.between);
-        let at = clamped(there.at);
+        let at = inside(there.at);
         let vectors = textureLoad(motion, at, 0);
         let difference = vectors - (*sides).back_motion;
         let difference2 = dot(difference, difference);

@@ -14,7 +14,7 @@ const MOST_SLOPE: f32 = 4.0;    // from a texel to the next, as a multiple of th
 alias Differences = texture_storage_2d<rgba32uint, write>;
 
 fn color_at(px: vec2i) -> vec4f {
-    let at = clamp(px, vec2i(0), vec2i(frame.size) - 1);
+    let at = inside(px);
     return textureLoad(color, at, 0);
 }
 

@@ -24,10 +24,6 @@ fn valid_light(given: vec4f) -> vec3f {
     return select(vec3f(0.0), clamp(given.rgb, vec3f(0.0), vec3f(BRIGHTEST_LIGHT)), is_finite4(vec4f(given.rgb, 0.0)));
 }
 
-fn inside(px: vec2i) -> vec2i {
-    return clamp(px, vec2i(0), vec2i(frame.size) - 1);
-}
-
 struct Square {         // four pixels, and where between their middles a place is
     pair: vec4i,        // the first one, the last one
     share: vec2f,
