@@ -41,12 +41,31 @@ class LightChanges:
     linear: wgpu.GPUSampler
     step: int
     """Pixels along a small pixel."""
+    standing: wgpu.GPUTextureView
+    """Of small pixels: shares of the previous and the next picture's light where that stands."""
+    near: tuple[wgpu.GPUTextureView, wgpu.GPUTextureView]
+    """Those pictures; any others where nothing stands."""
 
     @classmethod
     def none(cls, device: wgpu.GPUDevice) -> LightChanges:
         """Nothing changes."""
         view = TexturePool(device).view("none", (1, 1), gpu.texel(device, 4))
-        return cls(view, device.create_sampler(), 0)
+        return cls(view, device.create_sampler(), 0, view, (view, view))
+
+    def texels(self) -> dict[str, str]:
+        """The formats in which changed.wgsl reads the pictures from storage."""
+        return dict(zip(("previous", "next"), map(gpu.stored, self.near), strict=True))
+
+    def bindings(self) -> dict[str, wgpu.GPUTextureView | wgpu.GPUSampler]:
+        """The inputs of changed.wgsl, by their names there."""
+        previous, next = self.near
+        return {
+            "changes": self.view,
+            "linear": self.linear,
+            "standing": self.standing,
+            "previous": previous,
+            "next": next,
+        }
 
 
 class ChangingLight:
@@ -55,6 +74,8 @@ class ChangingLight:
     A moment between two pictures has light of both, by its distance in time. A blur takes the light
     of a picture itself; this adds the rest where the same is seen along the motion, in a light that
     differs visibly, and where neither neighbour shows the same, as it is not there all the time.
+    Where a picture stands and is all of an exposure, each pixel takes its share of the neighbours'
+    own light there, which averages noise and jitter as a longer exposure does.
     """
 
     def __init__(self, device: wgpu.GPUDevice):
@@ -63,6 +84,8 @@ class ChangingLight:
         self._sums = ScratchBuffer(device)
         self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self._small: dict[int, wgpu.GPUTexture] = {}  # the latest last
+        none = self._images.view("no light", (1, 1), self._texel)
+        self._none = self._near = none, none
 
     def encode(
         self,
@@ -75,20 +98,21 @@ class ChangingLight:
     ) -> None:
         """Record the change of one part of an exposure, onto those before unless it `begins`.
 
-        `picture`: linear light by index. `shares`: see `shares_of`. `part`: of the exposure.
+        `picture`: linear light by index, which `changes` refers to where `part` is 1. `shares`: see
+        `shares_of`. `part`: of the exposure.
         """
-        picture_size = surroundings.motion.size
+        picture_size, indices = surroundings.motion.size, surroundings.indices
         size, step = _small_size(picture_size), step_of(picture_size)
         none = self._images.view("none", (1, 1), "r32float")
         sums = self._sums.at_least(_TEXEL * size[0] * size[1])
-        here = self._reduced(encoder, surroundings.indices[1], picture)
+        here = self._reduced(encoder, indices[1], picture)
         if not (any(shares) or begins):
             return
         texels = {"here": self._texel, "Output": self._texel}
         kernel = gpu.kernel(self._device, f"{_FOLDER}/change.wgsl", texels, STEP=step)
         previous, next = (
             here if index is None else self._reduced(encoder, index, picture)
-            for index in surroundings.indices[::2]
+            for index in indices[::2]
         )
         light = gpu.uniform(
             self._device,
@@ -96,9 +120,14 @@ class ChangingLight:
             "Light",
             factors=surroundings.factors,
             shares=part * np.array(shares),
-            exist=[index is not None for index in surroundings.indices[::2]],
+            exist=[index is not None for index in indices[::2]],
             begins=begins,
+            whole=part == 1,
         )
+        self._near = self._none
+        if part == 1:
+            before, after = (indices[1] if i is None else i for i in indices[::2])
+            self._near = picture(before).create_view(), picture(after).create_view()
         kernel.run(
             encoder,
             "main",
@@ -112,12 +141,16 @@ class ChangingLight:
             holdout=surroundings.holdout or none,
             sums={"buffer": sums, "offset": 0, "size": sums.size},
             changes=self._images.view("changes", size, self._texel),
+            standing=self._images.view("standing", size, self._texel),
         )
 
     def changes(self, size: Sequence[int]) -> LightChanges:
         """Those of all parts so far, of pictures of this size."""
-        view = self._images.view("changes", _small_size(size), self._texel)
-        return LightChanges(view, self._linear, step_of(size))
+        view, standing = (
+            self._images.view(name, _small_size(size), self._texel)
+            for name in ("changes", "standing")
+        )
+        return LightChanges(view, self._linear, step_of(size), standing, self._near)
 
     def add(
         self,
@@ -126,15 +159,15 @@ class ChangingLight:
         output: wgpu.GPUTextureView,
     ) -> None:
         """Record the exposure with the changes of its parts, into `output` (rgba32float)."""
-        changes, texels = self.changes(light.size), {"picture": gpu.stored(light)}
+        changes = self.changes(light.size)
+        texels = {"picture": gpu.stored(light), **changes.texels()}
         gpu.kernel(self._device, f"{_FOLDER}/add.wgsl", texels, STEP=changes.step).run(
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, (light.size[0], light.size[1])),
             picture=light,
-            changes=changes.view,
-            linear=changes.linear,
             output=output,
+            **changes.bindings(),
         )
 
     def _reduced(

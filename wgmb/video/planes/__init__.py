@@ -113,8 +113,7 @@ class Planes:
         given = {
             "code": writing(self.device, coding),
             "light": light,
-            "changes": changes.view,
-            "linear": changes.linear,
+            **changes.bindings(),
         }
         constants = {
             "CURVE": curve_of(coding),
@@ -122,7 +121,7 @@ class Planes:
             "ALPHA": coding.alpha,
             "STEP": changes.step,
         }
-        texels = {"light": gpu.stored(light)}
+        texels = {"light": gpu.stored(light), **changes.texels()}
         if coding.bits == FLOAT:
             samples = self._images.texture("samples", size, "rgba32float")
             gpu.kernel(self.device, "video/planes/encode.wgsl", texels, **constants).run(

@@ -58,6 +58,7 @@ class VideoSubject:
         self._planes = Planes(device)
         self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
         self._changing = ChangingLight(device)
+        self._lit: dict[str, np.ndarray] = {}  # what textures of _LIGHTS hold
         self._sum = ExposureSum(device)
         self._state = state
         self._exposed: VideoExposure | None = None
@@ -248,9 +249,11 @@ class VideoSubject:
             frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
 
             def light(index: int, names: dict = names) -> wgpu.GPUTexture:
-                other = self._frames(index)
-                self._images.upload(names[index], padded(other.color, 4, 1), "rgba32float")
-                return self._images.texture(names[index], other.size, "rgba32float")
+                other, name = self._frames(index), names[index]
+                if self._lit.get(name) is not other.color:
+                    self._images.upload(name, padded(other.color, 4, 1), "rgba32float")
+                    self._lit[name] = other.color
+                return self._images.texture(name, other.size, "rgba32float")
 
             holdout = frame.holdout
             assert frame.motion is not None

@@ -1,12 +1,20 @@
 // What the light of a picture differs from its mean over the exposure, where the same is seen in another light before
-// or after it, or where neither shows it. Between two pictures, light is taken to change evenly.
+// or after it, or where neither shows it. Between two pictures, light is taken to change evenly. Where a picture stands,
+// this tells how far, and changed.wgsl takes each pixel's own light of the neighbours, which averages noise and jitter.
 //#include common/frame.wgsl
+
+struct End {
+    gained: vec3f,      // light at the end of a way, less that at its start; none for noise
+    same: f32,          // 0 to 1: how far the same is seen there
+    stands: f32,        // 0 to 1: how far it is the same place, and little apart
+}
 
 struct Light {
     factors: vec2f,     // from the ways to the previous and the next picture to those in `motion`
     shares: vec2f,      // of their light in the exposure
     exist: vec2u,       // 1: there is such a picture
     begins: u32,        // 1: the first change of the exposure
+    whole: u32,         // 1: the picture is all of the exposure, so that what stands is told
 }
 
 @group(1) @binding(0) var<uniform> light: Light;
@@ -18,6 +26,7 @@ struct Light {
 @group(1) @binding(6) var holdout: texture_2d<f32>;     // 1 stays as it is; of one pixel, 0, where nothing does
 @group(1) @binding(7) var<storage, read_write> sums: array<vec4f>;      // of the changes so far, linear
 @group(1) @binding(8) var changes: Output;              // the same, for changed.wgsl
+@group(1) @binding(9) var standing: Output;             // shares of the neighbours' light at a pixel that stands
 
 override STEP: u32 = 4u;
 
@@ -30,6 +39,7 @@ const FAR: f32 = 0.235;         // mean difference of something else,
 const NEAR: f32 = 0.1;          // of what may as well be something else, as a fade does little harm,
 const NOISE: f32 = 0.0157;      // and of nothing
 const LEAST: f32 = 1.5e-5;      // variance
+const STILL: f32 = 1.0;         // px of motion, standard deviation of what stands
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -37,16 +47,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let px = min(STEP * id.xy + STEP / 2u, textureDimensions(motion) - 1u);
     let ways = textureLoad(motion, px, 0) / light.factors.xxyy / f32(STEP);
     let index = id.y * frame.size.x + id.x;
-    var back = vec4f(0.0, 0.0, 0.0, 1.0);
+    var back = End(vec3f(0.0), 1.0, 0.0);
     var ahead = back;
     if light.exist.x == 1u { back = toward(PREVIOUS, vec2i(id.xy), ways.xy); }
     if light.exist.y == 1u { ahead = toward(NEXT, vec2i(id.xy), ways.zw); }
-    let lost = (1.0 - back.w) * (1.0 - ahead.w);        // what neither shows is not there all the time
-    let change = light.shares.x * (back.w + lost) * back.xyz + light.shares.y * (ahead.w + lost) * ahead.xyz;
+    let lost = (1.0 - back.same) * (1.0 - ahead.same);  // what neither shows is not there all the time
+    let moving = (1.0 - vec2f(back.stands, ahead.stands)) * (vec2f(back.same, ahead.same) + lost);
+    let change = light.shares.x * moving.x * back.gained + light.shares.y * moving.y * ahead.gained;
     let before = select(sums[index].xyz, vec3f(0.0), light.begins == 1u);
-    let sum = vec4f(before + (1.0 - held(id.xy)) * change, 0.0);
+    let free = 1.0 - held(id.xy);
+    let sum = vec4f(before + free * change, 0.0);
     sums[index] = sum;
     textureStore(changes, id.xy, sum);
+    textureStore(standing, id.xy, vec4f(free * light.shares * vec2f(back.stands, ahead.stands), 0.0, 0.0));
 }
 
 /// The most that is held out of the pixels that a small pixel's change reaches.
@@ -64,11 +77,11 @@ fn held(small: vec2u) -> f32 {
     return most;
 }
 
-/// Difference of the light at the end of a way, none for noise, and how far the same is seen there (0 to 1).
-fn toward(other: u32, px: vec2i, way: vec2f) -> vec4f {
+/// What is at the end of a way [small px].
+fn toward(other: u32, px: vec2i, way: vec2f) -> End {
     let last = vec2i(frame.size) - 1;
     let to = vec2f(px) + way;
-    if any(to < vec2f(0.0)) || any(to > vec2f(last)) { return vec4f(0.0, 0.0, 0.0, 1.0); }
+    if any(to < vec2f(0.0)) || any(to > vec2f(last)) { return End(vec3f(0.0), 1.0, 0.0); }
     var apart = vec3f(0.0);
     var totals = vec2f(0.0);    // of grey, here and there
     var squares = vec3f(0.0);   // of grey here, there, and their product
@@ -89,10 +102,13 @@ fn toward(other: u32, px: vec2i, way: vec2f) -> vec4f {
     let unlike = max(spread.x - both * both / max(spread.y, LEAST), 0.0);
     let far = dot(abs(apart), vec3f(1.0 / 3.0)) / count;
     let lit = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR));
-    let same = max(lit, exp(-far * far / (NEAR * NEAR)));
+    let near = exp(-far * far / (NEAR * NEAR));
+    let moved = f32(STEP) * way / STILL;
+    let stands = select(0.0, near * exp(-dot(moved, moved) / 2.0), light.whole == 1u);
     let own = textureLoad(here, px, 0).rgb;
     let found = between(other, to);
-    return vec4f((1.0 - exp(-far * far / (NOISE * NOISE))) * (found * found - own * own), same);
+    let gained = (1.0 - exp(-far * far / (NOISE * NOISE))) * (found * found - own * own);
+    return End(gained, max(lit, near), stands);
 }
 
 /// Another picture between its pixels, whose centres are whole numbers.
