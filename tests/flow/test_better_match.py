@@ -80,6 +80,19 @@ def test_of_two_that_match_alike_the_one_that_changes_less_is_taken():
     assert (depth[:, :130] == 0.5).all() and (depth[:, 190:] == 1).all()
 
 
+@pytest.mark.parametrize("is_throughout", [False, True])
+def test_where_something_is_lost_its_difference_counts_more_but_not_its_change(is_throughout):
+    """Nothing is seen; the one is ragged, and the other a little more."""
+    near = [np.full((96, 160), 90, np.uint8)] * 3
+    ragged = np.random.default_rng(1).normal(0, 0.5, (96, 160)).astype(np.float32)
+    one, other = found(2, 1.0, 96, 160), found(6, 0.5, 96, 160)
+    one[0][..., 2] += ragged
+    other[0][..., 2] += 1.2 * ragged
+    loss = None if is_throughout else np.ones((24, 40), bool)
+    _, depth = better(near, one, other, 1.5, loss)
+    assert (depth == (0.5 if is_throughout else 1)).all()
+
+
 def test_without_depth_there_is_none():
     near = [shifted(2 * n, 64, 96) for n in (-1, 0, 1)]
     one, other = found(2, 1.0, 64, 96), found(6, 0.5, 64, 96)

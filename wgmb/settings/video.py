@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
-_MARGIN = 1.5  # of that search beside dense inverse search, see BetterMatch,
+_MARGIN = 1.6  # of that search beside dense inverse search, see BetterMatch,
 _BEST_MARGIN = 1.3  # and of the best one
 
 

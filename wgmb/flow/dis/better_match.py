@@ -35,9 +35,9 @@ class BetterMatch:
     """Motion and depth order from dense inverse search and from a search, the better per place.
 
     Better is what matches better and changes less from pixel to pixel. `margin`: how many times
-    that of dense inverse search the cost of the search may be where dense inverse search loses
-    something, by the ways there and back (consistency.py), and throughout where it loses much of
-    a picture: it makes differences small also where it follows something else.
+    the difference of dense inverse search counts where that loses something, by the ways there
+    and back (consistency.py): it makes differences small also where it follows something else.
+    Where it loses much of a picture, its whole cost counts so many times, throughout.
 
     `by_ways`: the search is taken throughout where much of a picture is lost, and clearly less of
     it by the search. For that, those beside a picture are searched, too.
@@ -86,7 +86,7 @@ class BetterMatch:
                 clearly = AT_ENDS if prev is None or next is None else CLEARLY
                 if others.mean() < clearly * loss.mean():
                     return other[0], None if one[1] is None else other[1]
-            return better([prev, here, next], one, other, self._margin, loss | is_much)
+            return better([prev, here, next], one, other, self._margin, None if is_much else loss)
 
         return better_of
 
@@ -135,8 +135,8 @@ def better(
     """`other` where its cost, averaged over some pixels, is less than that of `one`.
 
     `near`: a picture between its neighbours, of which one may lack, (height, width) uint8. `loss`:
-    of blocks of `SPACING`, bool, where `one` is lost, and the cost of `other` may be `margin`
-    times as large.
+    of blocks of `SPACING`, bool, where `one` is lost, and its difference counts `margin` times;
+    None: its cost does, throughout.
     """
     cv2: Any = importlib.import_module("cv2")
     here = near[1]
@@ -144,12 +144,16 @@ def better(
     height, width = here.shape
     step = -(-max(here.shape) // LONGEST)
     small = [None if g is None else _small(g, step).astype(np.float32) for g in near]
-    costs = []
-    for motion, _ in (one, other):
-        thin = np.ascontiguousarray(motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
-        costs.append(_match(small, thin) + ROUGH * _roughness(thin))
+    thin = [
+        np.ascontiguousarray(motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
+        for motion, _ in (one, other)
+    ]
+    differences = [_match(small, motion) for motion in thin]
     if loss is not None:
-        costs[0] *= 1 + (np.float32(margin) - 1) * _grown(loss, costs[0].shape)
+        differences[0] *= 1 + (np.float32(margin) - 1) * _grown(loss, differences[0].shape)
+    costs = [d + ROUGH * _roughness(m) for d, m in zip(differences, thin, strict=True)]
+    if loss is None:
+        costs[0] *= np.float32(margin)
     gain = cv2.blur(costs[0] - costs[1], (AROUND, AROUND))
     takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
     rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
