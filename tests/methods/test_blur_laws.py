@@ -281,7 +281,10 @@ def test_a_lone_good_pixel_fills_its_bad_neighbours(method):
 
 @pytest.mark.parametrize("curve", ["box", pytest.param("cosine", marks=pytest.mark.full)])
 def test_auto_takes_as_many_samples_as_it_needs(method, noise, curve):
-    """7.5 px of streak, a little jitter: as good as 64 samples to a pixel's own share of it."""
+    """7.5 px of streak, a little jitter: as good as 64 samples to a pixel's own share of it.
+
+    Two samples of `gather` are read at four places, which is three times as good.
+    """
     smooth = np.repeat(np.repeat(noise[::4, ::4], 4, axis=0), 4, axis=1)
     shutter = Shutter(180, curve=curve)
     auto, all_ = (
@@ -289,7 +292,8 @@ def test_auto_takes_as_many_samples_as_it_needs(method, noise, curve):
         for n in ("auto", 64)
     )
     few = blurred(smooth, moving(smooth, 15), samples=2, shutter=shutter, method=method)
-    assert np.abs(auto - all_).mean() < 0.15 * np.abs(few - all_).mean()
+    share = 0.3 if method == "gather" else 0.15
+    assert np.abs(auto - all_).mean() < share * np.abs(few - all_).mean()
 
 
 def test_auto_leaves_what_stands_still_to_the_bit(method, noise):

@@ -62,7 +62,7 @@ def shot(path, t, size=SIZE):
 def decibel(frame, way, method="gather", **options):
     """PSNR of a method's frame at 360 degrees."""
     got = wgmb.Blur(method, shutter=360, samples=16, **options)(frame)
-    times = Shutter(360).sample_times(16).astype(float)
+    times = Shutter(360).sample_times(64).astype(float)
     truth = np.mean([shot(way, t)[0] for t in times], axis=0)
     return -10 * np.log10(np.mean((got - truth) ** 2))
 
@@ -98,7 +98,7 @@ def test_circles_swings_and_kinks_are_nearly_exact():
     Before backgrounds that the frame itself shows were trusted, a neighbour's body went on straight
     beyond the kink and was seen there: 45.7 dB on the start, 39.1 dB on the bounce.
     """
-    for path, least in ((circles, 50), (swings, 51.5), (starts, 52), (bounces, 48.5)):
+    for path, least in ((circles, 48.5), (swings, 51), (starts, 55), (bounces, 49)):
         assert decibel(frame_of([shot(path, t) for t in (0, -1, 1)]), path) > least
 
 

@@ -48,6 +48,7 @@ def gather(frames, times):
     at = {f[0]: f for f in frames}
     span = times[0] - (times[1] - times[0]) / 2, times[-1] + (times[1] - times[0]) / 2
     longest = max(-span[0], span[1])
+    duration = (span[1] - span[0]) / len(times)
     layers = [
         separate(*f, longest, prev=at.get(f[0] - 1), next=at.get(f[0] + 1)) for f in frames[1:]
     ]
@@ -77,7 +78,7 @@ def gather(frames, times):
             if max(tile["longest"] for tile in here[: len(layers) - len(far)]) >= 0.01:
                 edge = width_of(layers, here, span, len(times))
                 seen = [
-                    instant(layers, here, (x, y), t, own, (n, len(times)), edge)
+                    instant(layers, here, (x, y), t, own, (n, len(times), duration), edge)
                     for n, t in enumerate(times)
                 ]
                 if any(one is None for one in seen):
@@ -550,9 +551,10 @@ def scatter(frame, tiles, span, slices, own):
 def instant(layers, tiles, pixel, t, color, sample, edge):
     """The samples at the pixel at time `t`: edge, the edge behind it, the opaque one.
 
-    `sample`: its number, and how many there are. None: something that all frames hide.
+    `sample`: its number, how many there are, and for how long each stands. None: something that
+    all frames hide.
     """
-    (x, y), (n, samples) = pixel, sample
+    (x, y), (n, samples, duration) = pixel, sample
     slice_ = (2 * n + 1) * min(SLICES, samples) // (2 * samples)
     (opaque, front_edge, back_edge), miss = resolve_visibility(layers, tiles, x, y, t, slice_)
     shown = []
@@ -564,7 +566,7 @@ def instant(layers, tiles, pixel, t, color, sample, edge):
         shown.append(opaque)
     clear, sum_ = 1.0, 0.0
     for s in shown:
-        got, cover = fetch(layers[s.frame], s, edge)
+        got, cover = fetch(layers[s.frame], s, edge, (t, duration))
         sum_ = sum_ + clear * got
         clear *= 1 - cover
     if clear < 0.5:
@@ -683,16 +685,14 @@ def is_complement(own, found, t):
     """
     if (found.frame, found.back) != (0, True):
         return False
-    height, width = own.edgeless.shape
-    i, j = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
-    return own.by_color[j, i] and np.hypot(*moved(own.trajectory[0][j, i], t)) < 2
+    p = nearest(own, found.at)
+    return own.by_color[p] and np.hypot(*moved(own.trajectory[0][p], t)) < 2
 
 
 def is_hidden(own, frame, found):
     """True if a frame hides a sample of another at its own instant, or does not hold its place."""
     height, width = own.edgeless.shape
-    there = np.clip(found.at, 0, (width - 1, height - 1)).astype(int)
-    here = found.at + moved(frame.trajectory[0][there[1], there[0]], -frame.offset)
+    here = found.at + moved(frame.trajectory[0][nearest(frame, found.at)], -frame.offset)
     if not (0 <= here[0] < width and 0 <= here[1] < height):
         return True
     return own.depth[0][int(here[1]), int(here[0])] * 1.05 < found.true_depth
@@ -772,19 +772,52 @@ def width_of(layers, tiles, span, samples):
     return np.clip(0.5 * (span[1] - span[0]) * max(lengths) / samples, 0.667, 1)
 
 
-def fetch(frame, s, edge):
-    """Colour and coverage of a sample, from the texels of its own surface."""
+def fetch(frame, s, edge, stratum):
+    """Mean colour and coverage of a sample over the `stratum`: a time, and how long it lasts."""
+    (t, duration), k = stratum, int(s.back)
+    path, u = frame.trajectory[k][nearest(frame, s.at)], t - frame.offset
+    way = moved(path, u + duration / 2) - moved(path, u - duration / 2)
     if not s.back and frame.edgeless[s.pixel]:
-        if frame.offset == 0 and frame.smooth[s.pixel]:
-            return cubic(frame.color[0], *s.at), 1.0
-        return bilinear(frame.color[0], *s.at), 1.0
+        return passing(frame, s, way), 1.0
+    length = np.hypot(*way)
+    off = min(np.sqrt(max(length**2 / 12 - edge**2 / 2, 0)), 0.75)
+    places = [s.at + sign * off * way / max(length, 1e-6) for sign in (1, -1)]
+    *color, cover = np.mean([np.append(*texels(frame, s, at, edge)) for at in places], axis=0)
+    color = np.array(color)
+    if s.back and cover > 1e-4:
+        return color / cover, 1.0
+    return color, cover
+
+
+def passing(frame, s, way):
+    """Colour of a smooth surface; on a long way, of two places, as far as they show it."""
+    z, seen = frame.depth[0][nearest(frame, s.at)], []
+    for side in (-0.25, 0.25) if np.hypot(*way) > 1.5 else (0,):
+        at = s.at + side * way
+        p = nearest(frame, at)
+        if not (frame.edgeless[p] and z / 1.3 < frame.depth[0][p] < 1.3 * z):
+            at = s.at
+        smooth = frame.offset == 0 and frame.smooth[nearest(frame, at)]
+        seen.append((cubic if smooth else bilinear)(frame.color[0], *at))
+    return np.mean(seen, axis=0)
+
+
+def nearest(frame, at):
+    """The pixel of a frame nearest to a place."""
     height, width = frame.edgeless.shape
-    corner = np.floor(s.at - 0.5).astype(int)
-    color, cover = 0.0, 0.0
+    i, j = np.clip(at, 0, (width - 1, height - 1)).astype(int)
+    return j, i
+
+
+def texels(frame, s, at, edge):
+    """Colour and coverage at a place of a sample, from the texels of its own surface."""
+    height, width = frame.edgeless.shape
+    corner = np.floor(at - 0.5).astype(int)
+    color, cover = np.zeros_like(frame.color[0][0, 0]), 0.0
     for dj in (0, 1):
         for di in (0, 1):
             i, j = corner[0] + di, corner[1] + dj
-            line = 1 - np.abs(s.at - 0.5 - (i, j))
+            line = 1 - np.abs(at - 0.5 - (i, j))
             share = np.prod(np.clip((line - 0.5) / edge + 0.5, 0, 1))
             p = min(max(j, 0), height - 1), min(max(i, 0), width - 1)
             z, behind = frame.depth[0][p], frame.depth[1][p] > 0
@@ -793,8 +826,6 @@ def fetch(frame, s, edge):
             elif s.true_depth / 1.3 <= z <= 1.3 * s.true_depth:
                 color = color + share * frame.color[0][p]
                 cover += share * (1.0 if s.back else frame.coverage[p])
-    if s.back and cover > 1e-4:
-        return color / cover, 1.0
     return color, cover
 
 

@@ -2,14 +2,11 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/search/moving_light.wgsl
+//#include methods/gather/search/passing.wgsl
 //#include methods/gather/search/search.wgsl
 //#include methods/gather/search/visibility.wgsl
 
-@group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
 @group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
-@group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
-
-override WEIGHTED: bool = false;    // pixels have weights
 
 const EDGE_WIDTH: f32 = 0.5;            // of edges between two texels, as a share of the motion from sample to sample,
 const LEAST_WIDTH: f32 = 0.667;         // and at least [px]; at 1, they are bilinear
@@ -38,7 +35,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
 }
 
 /// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
-fn composite_front_to_back(visible: Visible, t: f32, duration: f32, width: f32) -> Composite {
+fn composite_front_to_back(visible: Visible, t: f32, duration: f32, around: f32, step: f32) -> Composite {
     let front_edge = is_before(visible.front_edge, visible.opaque);
     let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
         && is_behind(visible.back_edge, visible.front_edge);
@@ -54,18 +51,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, width: f32) 
         var part = visible.opaque;
         if back_edge && n == 1u { part = visible.back_edge; }
         if front_edge && n == 0u { part = visible.front_edge; }
-        var one = Composite();
-        var i = 0u;
-        loop {
-            if n < parts { add_texel(&one, part, i, width); }
-            i++;
-            if n >= parts || i >= 4u { break; }
-        }
-        if part.layer % 2u == 1u && one.coverage > 1e-4 {       // backgrounds are opaque
-            one.color /= one.coverage;
-            one.weight /= one.coverage;
-            one.coverage = 1.0;
-        }
+        var one = texels_of(part, t, around, step, n < parts);
         if MOVING_LIGHT && n < parts { one.color += one.coverage * moving_light(part.at, part.layer, t, duration); }
         one.residual = one.coverage * sqrt(part.residual2);
         var from_around = part.layer > 1u;
@@ -84,7 +70,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, width: f32) 
         var counts = 1.0;
         if WEIGHTED { counts = matte_at(nearest_pixel(at), layer / 2u).weight; }
         let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
-        var color = resampled(at, layer, visible.opaque.layer == 0u);
+        var color = passing(at, layer, t, around, step);
         if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
         var one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours, 0.0);
         if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, layer, t, duration); }
@@ -93,18 +79,43 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, width: f32) 
     return sum;
 }
 
+/// What the texels of its own surface show of a sample, the mean over the time `around` it; nothing unless `wanted`.
+fn texels_of(sample: Sample, t: f32, around: f32, step: f32, wanted: bool) -> Composite {
+    let width = width_of(step);
+    var off = vec2f(0.0);
+    if wanted && step > LONG_WAY { off = off_middle(way_at(sample.at, sample.layer, t, around), width); }
+    let count = select(4u, 8u, any(off != vec2f(0.0)));     // of one place or two
+    var one = Composite();
+    var i = 0u;
+    loop {
+        if wanted { add_texel(&one, sample, sample.at + select(off, -off, i >= 4u), i % 4u, width); }
+        i++;
+        if !wanted || i >= count { break; }
+    }
+    let share = 4.0 / f32(count);
+    one.color *= share;
+    one.weight *= share;
+    one.coverage *= share;
+    if sample.layer % 2u == 1u && one.coverage > 1e-4 {     // backgrounds are opaque
+        one.color /= one.coverage;
+        one.weight /= one.coverage;
+        one.coverage = 1.0;
+    }
+    return one;
+}
+
 /// The width of edges between two texels, up to 1, by the longest step from sample to sample [px].
 fn width_of(step: f32) -> f32 {
     return clamp(EDGE_WIDTH * step, LEAST_WIDTH, 1.0);
 }
 
-/// Add texel `i` of the four around a sample, if it is of the same surface. Bilinear weights hide the gaps between long steps,
+/// Add texel `i` of the four around a place `at` of a sample, if it is of the same surface. Bilinear weights hide the gaps between long steps,
 /// but blur as much as a motion of 1.4 px. Where edges are narrower, the nearer texel counts for more.
-fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, width: f32) {
+fn add_texel(sum: ptr<function, Composite>, sample: Sample, at: vec2f, i: u32, width: f32) {
     let front = sample.layer / 2u * 2u;
     let is_back = sample.layer % 2u == 1u;
-    let corner = floor(sample.at - 0.5);
-    let bilinear = sample.at - 0.5 - corner;
+    let corner = floor(at - 0.5);
+    let bilinear = at - 0.5 - corner;
     let share = clamp((bilinear - 0.5) / width + 0.5, vec2f(0.0), vec2f(1.0));
     let step = vec2f(vec2u(i & 1u, i >> 1u));
     let px = nearest_pixel(corner + step);
@@ -120,18 +131,4 @@ fn add_texel(sum: ptr<function, Composite>, sample: Sample, i: u32, width: f32) 
     (*sum).color += amount * textureLoad(layer_colors, px, front + u32(from_back), 0);
     (*sum).weight += amount * select(matte.weight, 1.0, from_back);
     (*sum).coverage += amount * select(matte.coverage, 1.0, is_back);
-}
-
-/// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
-/// differs from the line by their second differences; those of the nearest texel stand for both. It is never less than half
-/// of the line: beside a lamp it would swing far below 0.
-fn resampled(at: vec2f, layer: u32, is_own: bool) -> vec4f {
-    let f = fract(at - 0.5);
-    let px = nearest_pixel(at);
-    let differences = textureLoad(second_differences, px, 0);
-    let across = vec4f(unpack2x16float(differences.x), unpack2x16float(differences.y));
-    let down = vec4f(unpack2x16float(differences.z), unpack2x16float(differences.w));
-    let share = select(vec2f(0.0), 0.5 * f * (1.0 - f), is_own);
-    let line = textureSampleLevel(layer_colors, linear, at / vec2f(frame.size), layer, 0.0);
-    return line - share.x * across - share.y * down;
 }

@@ -32,7 +32,7 @@ struct Pixel {          // what all times of a pixel have in common
     c: Candidates,
     trajectory: Trajectory5,    // its own
     times: SampleTimes,
-    width: f32,         // of edges between two texels, see add_texel()
+    step: f32,          // the longest way of what may be there from sample to sample [px]
     share: f32,         // of a time, applied before adding, so that no sum of finite colours overflows
 }
 
@@ -99,8 +99,8 @@ fn pixel_at(id: vec2u) -> Pixel {
     let shift = frame.jitter * (pixel_noise(id) - 0.5);
     let times = sample_times(x, shift, a, b, c);
     let share = 1.0 / f32(times.count);
-    let width = width_of(share * longest_blur(a, b, c));
-    return Pixel(x, id / BLOCK, a, b, c, unpack_trajectory(surface_of(vec2i(id), 0u)), times, width, share);
+    let step = share * longest_blur(a, b, c);
+    return Pixel(x, id / BLOCK, a, b, c, unpack_trajectory(surface_of(vec2i(id), 0u)), times, step, share);
 }
 
 /// True if nothing moves, nor does anything come here.
@@ -131,7 +131,8 @@ fn add_single(exposure: ptr<function, Exposure>, times: ptr<function, Times>, pi
         }
         if todo != 0u && is_even {
             let duration = duration_in(pixel.times, first, todo);
-            var color = resampled(at, front, true);
+            let around = time_around(pixel.times, index_in(pixel.times, first, todo));
+            var color = passing(at, front, t, around, pixel.step);
             if MOVING_LIGHT { color += moving_light(at, 0u, t, duration); }
             let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
             var one = Composite(color, counts, 1.0, residual, 0.0, 0.0);
@@ -155,7 +156,8 @@ fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, st
             let t = time_in(pixel.times, times.first, todo);
             let visible = resolve_visibility(pixel.x, starts, t, pixel.a, pixel.b, pixel.c);
             let duration = duration_in(pixel.times, times.first, todo);
-            let result = composite_front_to_back(visible, t, duration, pixel.width);
+            let around = time_around(pixel.times, index_in(pixel.times, times.first, todo));
+            let result = composite_front_to_back(visible, t, duration, around, pixel.step);
             let is_covered = result.coverage > 0.5;
             if is_covered {
                 add_time(exposure, result, pixel.share / result.coverage);
@@ -261,11 +263,15 @@ fn static_unlit(px: vec2u) -> f32 {
 
 /// Time of the lowest set bit of a word whose bit 0 is sample `first`.
 fn time_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
-    return shutter_time(times, min(first + firstTrailingBit(bits), times.count - 1u));
+    return shutter_time(times, index_in(times, first, bits));
 }
 
 /// For how long that sample stands [frame intervals].
 fn duration_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     if !MOVING_LIGHT { return 0.0; }
-    return sample_duration(times, min(first + firstTrailingBit(bits), times.count - 1u));
+    return sample_duration(times, index_in(times, first, bits));
+}
+
+fn index_in(times: SampleTimes, first: u32, bits: u32) -> u32 {
+    return min(first + firstTrailingBit(bits), times.count - 1u);
 }
