@@ -780,7 +780,7 @@ def fetch(frame, s, edge, stratum):
     if not s.back and frame.edgeless[s.pixel]:
         return passing(frame, s, way), 1.0
     length = np.hypot(*way)
-    off = min(np.sqrt(max(length**2 / 12 - edge**2 / 2, 0)), 0.75)
+    off = min(np.sqrt(max(length**2 / 12 - edge**2 / 2, 0)), 0.5)
     places = [s.at + sign * off * way / max(length, 1e-6) for sign in (1, -1)]
     *color, cover = np.mean([np.append(*texels(frame, s, at, edge)) for at in places], axis=0)
     color = np.array(color)

@@ -15,7 +15,7 @@ override WEIGHTED: bool = false;    // pixels have weights
 
 const LONG_WAY: f32 = 1.5;          // from here on a surface is read at two places [px]
 const BLURRED: f32 = 0.5;           // squared blur of edges between two texels, as a share of their squared width,
-const MOST_OFF: f32 = 0.75;         // and how far they are read from the middle of their way, at most [px]
+const MOST_OFF: f32 = 0.5;          // and how far they are read from the middle of their way, at most [px]
 
 /// The longest time around sample `i` for which it stands [frame intervals].
 fn time_around(times: SampleTimes, i: u32) -> f32 {
