@@ -6,15 +6,8 @@
 //#include methods/gather/search/search.wgsl
 //#include methods/gather/search/visibility.wgsl
 
-@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
-
 const EDGE_WIDTH: f32 = 0.5;            // of edges between two texels, as a share of the motion from sample to sample,
 const LEAST_WIDTH: f32 = 0.667;         // and at least [px]; at 1, they are bilinear
-
-/// The matte of a pixel of frame `f`.
-fn matte_at(px: vec2u, f: u32) -> Matte {
-    return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);
-}
 
 struct Composite {
     color: vec4f,       // premultiplied by coverage

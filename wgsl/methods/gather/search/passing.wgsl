@@ -9,6 +9,7 @@
 //#include methods/gather/search/visibility.wgsl
 
 @group(1) @binding(4) var layer_colors: texture_2d_array<f32>;  // front, back per frame; premultiplied by alpha, coverage, weight
+@group(1) @binding(5) var mattes: texture_2d_array<u32>;    // stored as r32uint, rg32uint if WEIGHTED: per frame, see pack_matte()
 @group(1) @binding(6) var second_differences: texture_2d<u32>;  // stored as rgba32uint: of the frame's own front colours
 
 override WEIGHTED: bool = false;    // pixels have weights
@@ -16,6 +17,11 @@ override WEIGHTED: bool = false;    // pixels have weights
 const LONG_WAY: f32 = 1.5;          // from here on a surface is read at two places [px]
 const BLURRED: f32 = 0.5;           // squared blur of edges between two texels, as a share of their squared width,
 const MOST_OFF: f32 = 0.5;          // and how far they are read from the middle of their way, at most [px]
+
+/// The matte of a pixel of frame `f`.
+fn matte_at(px: vec2u, f: u32) -> Matte {
+    return unpack_matte(textureLoad(mattes, px, f, 0), WEIGHTED);
+}
 
 /// The longest time around sample `i` for which it stands [frame intervals].
 fn time_around(times: SampleTimes, i: u32) -> f32 {
@@ -47,17 +53,17 @@ fn off_middle(way: vec2f, width: f32) -> vec2f {
 }
 
 /// The colour of a layer's surface whose place at the time `t` is `at`, its mean over the time `around` it. A place
-/// of its way that does not show it counts as the middle; so do all if pixels have weights.
+/// of its way that does not show it, or in another weight, counts as the middle.
 fn passing(at: vec2f, layer: u32, t: f32, around: f32, step: f32) -> vec4f {
     var way = vec2f(0.0);
-    if !WEIGHTED && step > LONG_WAY { way = way_at(at, layer, t, around); }
+    if step > LONG_WAY { way = way_at(at, layer, t, around); }
     let is_long = dot(way, way) > LONG_WAY * LONG_WAY;
     let count = select(1u, 2u, is_long);
     var sum = vec4f(0.0);
     var i = 0u;
     loop {
         let place = at + (0.5 * f32(i) - 0.25) * way;
-        let moves = is_long && shows_same(at, place, layer);
+        let moves = is_long && shows_same(at, place, layer) && weighs_same(at, place, layer);
         sum += resampled(select(at, place, moves), layer);
         i++;
         if i >= count { break; }
@@ -70,6 +76,18 @@ fn shows_same(at: vec2f, place: vec2f, layer: u32) -> bool {
     let z = unpack_depth(surface_of(vec2i(nearest_pixel(at)), layer));
     let there = unpack_depth(surface_of(vec2i(nearest_pixel(place)), layer));
     return there > 0.0 && there < z * BODY_DEPTH_RATIO && z < there * BODY_DEPTH_RATIO;
+}
+
+/// True if all that is read at a place of a front layer has the weight of another place, or there are no weights.
+fn weighs_same(at: vec2f, place: vec2f, layer: u32) -> bool {
+    var is_same = true;
+    let wanted = matte_at(nearest_pixel(at), layer / 2u).weight;
+    let count = select(0u, 4u, WEIGHTED);
+    for (var i = 0u; i < count; i++) {
+        let px = nearest_pixel(floor(place - 0.5) + vec2f(vec2u(i & 1u, i >> 1u)));
+        is_same = is_same && matte_at(px, layer / 2u).weight == wanted;
+    }
+    return is_same;
 }
 
 /// Catmull-Rom interpolation where the frame's own texel is smooth, bilinear elsewhere. Between two texels the cubic
