@@ -62,6 +62,14 @@ fn shutter_time(times: SampleTimes, i: u32) -> f32 {
     return time_in_stratum(strata[i], times.shift) + times.delay;
 }
 
+/// When sample `i` begins and ends to stand for the exposure, without the delay [frame intervals].
+fn sample_span(times: SampleTimes, i: u32) -> vec2f {
+    let shares = vec2f(f32(i), f32(i) + 1.0) / f32(times.count);
+    if BOX_SHUTTER { return mix(vec2f(shutter.span.x), vec2f(shutter.span.y), shares); }
+    if ADAPTIVE { return vec2f(time_at_share(shares.x), time_at_share(shares.y)); }
+    return vec2f(strata[i].begin, strata[i].end);
+}
+
 /// The time at which the share `u`, 0..1, of the exposure has passed [frame intervals].
 fn time_at_share(u: f32) -> f32 {
     let x = u * f32(arrayLength(&strata));

@@ -79,7 +79,7 @@ fn write_features(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn luma(px: vec2i) -> f32 {
-    return textureLoad(picture, clamp(px, vec2i(0), vec2i(frame.size) - 1), 0).w;
+    return textureLoad(picture, inside(px), 0).w;
 }
 
 /// Gaussian mean of the gradients' squares along an axis.

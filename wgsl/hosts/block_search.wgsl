@@ -24,7 +24,7 @@ fn shrink(@builtin(global_invocation_id) id: vec3u) {
 }
 
 fn at(px: vec2i) -> vec3f {
-    return textureLoad(second, clamp(px, vec2i(0), vec2i(frame.size) - 1), 0).rgb;
+    return textureLoad(second, inside(px), 0).rgb;
 }
 
 fn between(px: vec2f) -> vec3f {
@@ -39,7 +39,7 @@ fn cost(px: vec2i, by: vec2f) -> f32 {
     var sum = 0.0;
     for (var y = -PATCH; y <= PATCH; y++) {
         for (var x = -PATCH; x <= PATCH; x++) {
-            let p = clamp(px + vec2i(x, y), vec2i(0), vec2i(frame.size) - 1);
+            let p = inside(px + vec2i(x, y));
             let apart = abs(textureLoad(first, p, 0).rgb - between(vec2f(p) + by));
             sum += apart.x + apart.y + apart.z;
         }

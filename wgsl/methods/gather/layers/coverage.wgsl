@@ -7,7 +7,7 @@
 
 const BETWEEN: f32 = 0.4;       // a vector from 0.1 to 0.9 of the way between two is a mixture of them
 const BEYOND_HALF: f32 = 0.4;   // how far a colour leads beyond one half, against vectors that are means over their pixels,
-const FAST_APART: f32 = 16.0;     // where front and back move apart by this, both ways together [px],
+const FAST_APART: f32 = 16.0;   // where front and back move apart by this, both ways together [px],
 const MOST_BENT: f32 = 0.1;       // and bend by no more than this share of it: vectors that bend vary too
 const LEAST_CONTRAST: f32 = 0.05;   // of two colours that tell coverage
 const MATTE_CONTRAST: f32 = 0.5;    // difference of the alphas of front and back from which on alpha tells coverage

@@ -240,7 +240,7 @@ fn look_along(sum: ptr<function, Light>, px: vec2i, surface: vec4u, along: vec2i
     loop {
         at = px + far * along;
         let is_inside = all(at >= vec2i(0)) && all(at < vec2i(frame.size));
-        let there = shown(clamp(at, vec2i(0), vec2i(frame.size) - 1));
+        let there = shown(inside(at));
         let distance = f32(far) * length(vec2f(along));
         let off = displacement_of(there.surface, -source.offset) - motion;
         let moves_alike = dot(off, off) < (SAME_MOTION + BEND * distance) * (SAME_MOTION + BEND * distance);
@@ -251,7 +251,7 @@ fn look_along(sum: ptr<function, Light>, px: vec2i, surface: vec4u, along: vec2i
         if !goes_on || is_found || far >= FARTHEST { break; }
     }
     let away = vec2f(at - px);
-    add_light(sum, clamp(at, vec2i(0), vec2i(frame.size) - 1), own_at, select(0.0, 1.0 / dot(away, away), is_found));
+    add_light(sum, inside(at), own_at, select(0.0, 1.0 / dot(away, away), is_found));
 }
 
 fn add_light(sum: ptr<function, Light>, px: vec2i, own_at: vec2f, share: f32) {

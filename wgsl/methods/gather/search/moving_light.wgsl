@@ -23,10 +23,8 @@ const SAME_SURFACE: f32 = 1.0;  // a way there and back ends no farther than thi
 
 /// For how long sample `i` stands [frame intervals].
 fn sample_duration(times: SampleTimes, i: u32) -> f32 {
-    let count = f32(times.count);
-    if BOX_SHUTTER { return (shutter.span.y - shutter.span.x) / count; }
-    if ADAPTIVE { return time_at_share((f32(i) + 1.0) / count) - time_at_share(f32(i) / count); }
-    return strata[i].end - strata[i].begin;
+    let span = sample_span(times, i);
+    return span.y - span.x;
 }
 
 /// False at a place of this frame [px] where light rests in all frames: there the addition is 0, and sure.

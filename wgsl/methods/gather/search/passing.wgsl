@@ -25,16 +25,9 @@ fn matte_at(px: vec2u, f: u32) -> Matte {
 
 /// The longest time around sample `i` for which it stands [frame intervals].
 fn time_around(times: SampleTimes, i: u32) -> f32 {
-    let count = f32(times.count);
-    if BOX_SHUTTER { return (1.0 - 2.0 * abs(times.shift)) * (shutter.span.y - shutter.span.x) / count; }
     let t = shutter_time(times, i) - times.delay;
-    var begin = strata[min(i, arrayLength(&strata) - 1u)].begin;
-    var end = strata[min(i, arrayLength(&strata) - 1u)].end;
-    if ADAPTIVE {
-        begin = time_at_share(f32(i) / count);
-        end = time_at_share((f32(i) + 1.0) / count);
-    }
-    return 2.0 * max(min(t - begin, end - t), 0.0);
+    let span = sample_span(times, i);
+    return 2.0 * max(min(t - span.x, span.y - t), 0.0);
 }
 
 /// The way [px] that a layer's surface goes past its place `at` in the time `around` the time `t` [frame intervals].

@@ -131,7 +131,7 @@ fn add_single(exposure: ptr<function, Exposure>, times: ptr<function, Times>, pi
         }
         if todo != 0u && is_even {
             let duration = duration_in(pixel.times, first, todo);
-            let around = time_around(pixel.times, index_in(pixel.times, first, todo));
+            let around = around_in(pixel.times, first, todo);
             var color = passing(at, front, t, around, pixel.step);
             if MOVING_LIGHT { color += moving_light(at, 0u, t, duration); }
             let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
@@ -156,7 +156,7 @@ fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, st
             let t = time_in(pixel.times, times.first, todo);
             let visible = resolve_visibility(pixel.x, starts, t, pixel.a, pixel.b, pixel.c);
             let duration = duration_in(pixel.times, times.first, todo);
-            let around = time_around(pixel.times, index_in(pixel.times, times.first, todo));
+            let around = around_in(pixel.times, times.first, todo);
             let result = composite_front_to_back(visible, t, duration, around, pixel.step);
             let is_covered = result.coverage > 0.5;
             if is_covered {
@@ -272,6 +272,12 @@ fn duration_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
     return sample_duration(times, index_in(times, first, bits));
 }
 
+/// The longest time around its own for which it stands [frame intervals].
+fn around_in(times: SampleTimes, first: u32, bits: u32) -> f32 {
+    return time_around(times, index_in(times, first, bits));
+}
+
+/// Its index.
 fn index_in(times: SampleTimes, first: u32, bits: u32) -> u32 {
     return min(first + firstTrailingBit(bits), times.count - 1u);
 }

@@ -43,7 +43,7 @@ fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
     var most = vec4f(-MAX_MOTION);
     var bend = vec2f(0.0);              // of half accelerations
     for (var i = 0; i < side * side; i++) {
-        let px = clamp(corner + vec2i(i % side, i / side), vec2i(0), vec2i(frame.size) - 1);
+        let px = inside(corner + vec2i(i % side, i / side));
         let vectors = clamp(textureLoad(motion, px, 0), vec4f(-MAX_MOTION), vec4f(MAX_MOTION));
         least = min(least, vectors);
         most = max(most, vectors);
