@@ -620,22 +620,21 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     far = far[::-1] if t > 0 else far
     seen, misses = [Sample(), Sample(), Sample()], []
 
-    def search_layer(f, back, seed, first):
-        """One search; where it led, and whether something is there."""
+    def search_layer(f, back, seed=None, nearest=0.0, first=None):
+        """One search from a seed, whose depth is at least `nearest`; where it led, and how deep."""
         frame, u = layers[f], t - layers[f].offset
         if seed is None:  # along the path of the pixel's place; behind it too
             seed = moved(frame.trajectory[int(back and f > 0)][y, x], u)
         d, residual, pixel = iterate_fixed_point(
-            frame.trajectory[int(back)], centre, seed, u, first
+            frame.trajectory[int(back)], frame.depth[int(back)], centre, seed, u, nearest, first
         )
         at, size = centre - d, np.array(frame.edgeless.shape[::-1])
         most = 0.5 if f else 1.0
         is_there = pixel is not None and residual <= most and (at >= 0).all() and (at < size).all()
         if first is None and not back and f not in far:
             misses.append(residual)
-        again = first is not None and first[1] and (np.abs(d - first[0]) < 0.75).all()
-        if is_there and not again and frame.depth[int(back)][pixel] > 0:
-            z = frame.depth[int(back)][pixel]
+        z = frame.depth[int(back)][pixel] if is_there else 0.0
+        if is_there and not is_again(d, z, first) and z > 0:
             weight = (1.1 if f else 1.0) * (1.2 if back and frame.inferred[pixel] else 1.0)
             found = Sample(z * weight, z, residual, at, f, back, pixel)
             is_opaque = back or frame.edgeless[pixel]
@@ -644,17 +643,19 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
             covered = f > 0 and is_covered(layers[0], x, y, found.true_depth, t)
             if not covered and (not (f in far or again) or is_hidden(layers[0], frame, found)):
                 record(seen, found, is_opaque)
-        return d if is_there else np.full(2, np.inf), is_there
+        if not is_there:
+            return np.full(2, np.inf), np.inf
+        return d, z if frame.edgeless[pixel] else 0.0
 
     def search_front(f):
         tile, u = tiles[f], t - layers[f].offset
-        own = search_layer(f, False, None, None)
+        own = search_layer(f, False)
         z, *pixel = tile["scattered"].get((slice_, y // BLOCK, x // BLOCK), (np.inf,))
         if z * (1.1 if f else 1.0) < seen[0].depth:
-            search_layer(f, False, moved(layers[f].trajectory[0][tuple(pixel)], u), own)
+            search_layer(f, False, moved(layers[f].trajectory[0][tuple(pixel)], u), z, own)
         for path, z, when in zip(tile["paths"], tile["depths"], tile["times"], strict=True):
             if z * (1.1 if f else 1.0) < seen[0].depth and when[0] <= u <= when[1]:
-                search_layer(f, False, moved(path, u), own)
+                search_layer(f, False, moved(path, u), z, own)
 
     def inferred():
         own_back = (seen[0].frame, seen[0].back) == (0, True)
@@ -664,7 +665,7 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
     hidden = np.isinf(seen[0].depth)
     behind = hidden and any(tiles[f]["edges"] for f in near)
     if behind:
-        search_layer(0, True, None, None)
+        search_layer(0, True)
     if len(order) > 1 and ((hidden and not is_complement(layers[0], seen[0], t)) or abs(t) > 0.25):
         search_front(order[1])
         if len(order) > 2 and inferred():
@@ -674,7 +675,7 @@ def resolve_visibility(layers, tiles, x, y, t, slice_):
                 search_front(f)
         for f in order[1:]:
             if behind and inferred() and (np.isinf(seen[0].depth) or np.isinf(seen[1].depth)):
-                search_layer(f, True, None, None)
+                search_layer(f, True)
     return seen, min(misses)
 
 
@@ -709,12 +710,17 @@ def is_covered(own, x, y, z, t):
     return own.depth[0][j, i] * 1.3 < own.depth[layer][y, x] < z / 1.3
 
 
-def iterate_fixed_point(paths, centre, seed, u, first):
+def is_again(d, z, first):
+    """True if it is where the first search led, and not clearly nearer than what that found."""
+    return first is not None and (np.abs(d - first[0]) < 0.75).all() and z * 1.05 >= first[1]
+
+
+def iterate_fixed_point(paths, depth, centre, seed, u, nearest, first):
     """Fixed point of d = displacement(centre - d) from a seed on: d, the last step, pixel."""
     height, width = paths.shape[:2]
     d, steps = seed, 6 if first is None else 4
     residual, pixel, before = np.inf, None, 0j
-    if first is not None and (np.abs(d - first[0]) < 0.75).all():
+    if is_again(d, nearest, first):
         return d, residual, pixel
     for n in range(steps):
         q = centre - d
@@ -727,7 +733,7 @@ def iterate_fixed_point(paths, centre, seed, u, first):
         residual, d = abs(way), step
         if residual < 0.5 or residual > back:  # there, or astray
             break
-        if first is not None and (np.abs(d - first[0]) < 0.75).all():
+        if is_again(d, depth[pixel], first):
             break
         if (
             n < steps - 1

@@ -129,22 +129,34 @@ fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candi
     let f = query.layer / 2u;
     let word = scattered_at(vec2u(query.x), query.u + offset_of(f), f, CROWDED && is_front && !is_far(query.layer));
     let there = displacement_in(word, query);
-    var first = vec2f(INFINITE);    // where the first search led; if nowhere, the place where it stopped tells nothing
+    var first = First(vec2f(INFINITE), INFINITE);
     var is_first = true;
     loop {
         let state = find_surface(&seeds, query, own, there, is_first, first, (*visible).opaque.depth);
         let most = select(MAX_RESIDUAL, NEIGHBOUR_RESIDUAL, query.layer > 1u);
         let is_there = state.residual2 <= most * most && is_inside(query.x - state.d);
-        if is_first && is_there { first = state.d; }
+        if is_first && is_there { first = First(state.d, max(depth_in(state.word), 0.0) * query.handicap); }
         if is_first && is_front && !is_far(query.layer) { (*visible).miss2 = min((*visible).miss2, state.residual2); }
         if is_there { record(visible, query, state); }
         let nearer = may_be_nearer(candidates, (*visible).opaque.depth / query.handicap);
-        seeds.pending &= nearer & ~are_solution(seeds, first);
-        let is_nearer = is_first && word != 0u && scattered_depth(word) * query.handicap < (*visible).opaque.depth;
-        if CROWDED && is_nearer && !same_solution(there, first) { seeds.pending |= SCATTERED; }
+        let clearly_nearer = may_be_nearer(candidates, first.depth / (query.handicap * SURFACE_DEPTH_RATIO));
+        seeds.pending &= nearer & (clearly_nearer | ~are_solution(seeds, first.d));
+        let z = scattered_depth(word) * query.handicap;
+        let is_nearer = is_first && word != 0u && z < (*visible).opaque.depth;
+        if CROWDED && is_nearer && !is_again(there, z, first) { seeds.pending |= SCATTERED; }
         is_first = false;
         if seeds.pending == 0u { break; }
     }
+}
+
+struct First {          // where the first search of a layer led; if nowhere, the place where it stopped tells nothing
+    d: vec2f,           // displacement [px]
+    depth: f32,         // biased; 0 at a silhouette, which nothing counts as nearer than
+}
+
+/// True if what is at a displacement and a depth is the first solution. What moves alike, but is clearly nearer, is not.
+fn is_again(d: vec2f, depth: f32, first: First) -> bool {
+    return same_solution(d, first.d) && depth * SURFACE_DEPTH_RATIO >= first.depth;
 }
 
 /// The displacement of the pixel in a word of what is scattered [px].
@@ -170,7 +182,7 @@ fn next_start(seeds: ptr<function, Seeds>, there: vec2f) -> vec2f {
 /// is given up if it leads to the first solution, to something that is not nearer than `limit`, or astray: its
 /// residual is INFINITE then.
 fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, there: vec2f,
-                is_first: bool, first: vec2f, limit: f32) -> WarpState {
+                is_first: bool, first: First, limit: f32) -> WarpState {
     var state = WarpState(0u, own, INFINITE);
     var n = 1u;
     var before = vec2f(0.0);    // the last step, if no leap came after it
@@ -179,12 +191,13 @@ fn find_surface(seeds: ptr<function, Seeds>, query: Query, own: vec2f, there: ve
         n = ITERATIONS_SAVED;
     }
     loop {              // a turn is a step
-        let back = state.d - first;
+        let back = state.d - first.d;
         let start = state.d;
         state = warp_step(query.x, state.d, query.u, query.layer);
         n++;
-        let again = same_solution(state.d, first);
-        let farther = !is_first && depth_in(state.word) * query.handicap >= limit;
+        let z = depth_in(state.word) * query.handicap;
+        let again = is_again(state.d, abs(z), first);
+        let farther = !is_first && z >= limit;
         let astray = !is_first && state.residual2 > MAX_STEP_RATIO * MAX_STEP_RATIO * dot(back, back);
         let ended = has_ended(state) || n > MAX_ITERATIONS || again || farther || astray;
         if again || farther { state.residual2 = INFINITE; }
