@@ -17,6 +17,7 @@ PATCH = 5  # px of these a side of a match, and over which changes of motion are
 AROUND = 25  # px of these a side over which what is compared is averaged
 ROUGH = 2.5  # levels of 255 that the motion's change from a pixel to the next costs, per px,
 MOST_ROUGH = 4.0  # px, beyond which a change costs no more
+MOST_OTHER = 8.0  # levels of 255 that the difference to the neighbour that fits worse may cost
 LOST_AROUND = 9  # px of these a side around what is lost, which count as lost
 MUCH = 0.03  # of a picture: where the one loses more, all of it counts as lost;
 CLEARLY = 0.4  # where the other loses less than so much of that, it is right throughout,
@@ -34,10 +35,12 @@ class Both(NamedTuple):
 class BetterMatch:
     """Motion and depth order from dense inverse search and from a search, the better per place.
 
-    Better is what matches better and changes less from pixel to pixel. `margin`: how many times
-    the difference of dense inverse search counts where that loses something, by the ways there
-    and back (consistency.py): it makes differences small also where it follows something else.
-    Where it loses much of a picture, its whole cost counts so many times, throughout.
+    Better is what matches better and changes less from pixel to pixel. Matches are those with the
+    neighbour that fits better, as the other may hide a pixel; but what both show should match in
+    both, so the difference to the other counts, up to `MOST_OTHER`. `margin`: how many times
+    the difference of dense inverse search to the former counts where that loses something, by the
+    ways there and back (consistency.py): it makes differences small also where it follows something
+    else. Where it loses much of a picture, that and its change count so many times, throughout.
 
     `by_ways`: the search is taken throughout where much of a picture is lost, and clearly less of
     it by the search. For that, those beside a picture are searched, too.
@@ -135,8 +138,8 @@ def better(
     """`other` where its cost, averaged over some pixels, is less than that of `one`.
 
     `near`: a picture between its neighbours, of which one may lack, (height, width) uint8. `loss`:
-    of blocks of `SPACING`, bool, where `one` is lost, and its difference counts `margin` times;
-    None: its cost does, throughout.
+    of blocks of `SPACING`, bool, where `one` is lost, and its difference to the neighbour that fits
+    better counts `margin` times; None: that and its change do, throughout.
     """
     cv2: Any = importlib.import_module("cv2")
     here = near[1]
@@ -148,13 +151,14 @@ def better(
         np.ascontiguousarray(motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
         for motion, _ in (one, other)
     ]
-    differences = [_match(small, motion) for motion in thin]
+    matches = [_match(small, motion) for motion in thin]
+    differences, others = ([match[k] for match in matches] for k in (0, 1))
     if loss is not None:
         differences[0] *= 1 + (np.float32(margin) - 1) * _grown(loss, differences[0].shape)
     costs = [d + ROUGH * _roughness(m) for d, m in zip(differences, thin, strict=True)]
     if loss is None:
         costs[0] *= np.float32(margin)
-    gain = cv2.blur(costs[0] - costs[1], (AROUND, AROUND))
+    gain = cv2.blur(costs[0] - costs[1] + (others[0] - others[1]), (AROUND, AROUND))
     takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
     rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
     takes = np.pad(takes, ((0, max(rows, 0)), (0, max(columns, 0))), mode="edge")
@@ -171,8 +175,11 @@ def _small(grey: np.ndarray, step: int) -> np.ndarray:
     return cv2.blur(grey, (step, step))[step // 2 :: step, step // 2 :: step]
 
 
-def _match(near: list[np.ndarray | None], motion: np.ndarray) -> np.ndarray:
-    """Mean difference of patches along a motion, to the neighbour that fits better."""
+def _match(near: list[np.ndarray | None], motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean difference of patches along a motion: to the neighbour that fits better, to the other.
+
+    That to the other is at most `MOST_OTHER`, and 0 where there is none.
+    """
     cv2: Any = importlib.import_module("cv2")
     prev, here, next = near
     assert here is not None
@@ -184,7 +191,8 @@ def _match(near: list[np.ndarray | None], motion: np.ndarray) -> np.ndarray:
             edge = cv2.BORDER_REPLICATE
             moved = cv2.remap(other, *at, cv2.INTER_LINEAR, borderMode=edge)
             found.append(cv2.blur(np.abs(moved - here), (PATCH, PATCH)))
-    return np.minimum.reduce(found)
+    worse = np.maximum.reduce(found) if len(found) > 1 else np.zeros_like(found[0])
+    return np.minimum.reduce(found), np.minimum(worse, np.float32(MOST_OTHER))
 
 
 def _roughness(motion: np.ndarray) -> np.ndarray:
