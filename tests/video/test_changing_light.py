@@ -82,9 +82,14 @@ def toward(here, other, x, y, way):
     far = np.abs((found - own).mean(0)).mean()
     near = np.exp(-((far / 0.1) ** 2))
     same = max(np.exp(-unlike / 0.0314**2 - (far / 0.235) ** 2), near)
-    stands = near * np.exp(-np.square(STEP * np.asarray(way)).sum() / 2)
     is_no_noise = 1 - np.exp(-((far / 0.0157) ** 2))
-    return is_no_noise * (between(other, *to) ** 2 - here[y, x] ** 2), same, stands
+    return is_no_noise * (between(other, *to) ** 2 - here[y, x] ** 2), same, near
+
+
+def resting(way, other):
+    """Twin of change.wgsl's, of ways [px]."""
+    on, back = (way - other) / 2, (way + other) / 2 / 3
+    return np.exp(-min(np.square(way).sum(), np.square([on, back]).sum()) / 2)
 
 
 def roots_to(light, near, shares):
@@ -119,14 +124,12 @@ def test_the_passes_are_their_twin(device, mixing, parts):
     changes, standing = np.zeros((height, width, 3)), np.zeros((height, width, 2))
     for y, x in np.ndindex(height, width):
         px = min(STEP * y + STEP // 2, HEIGHT - 1), min(STEP * x + STEP // 2, WIDTH - 1)
-        ends = []
-        for k, side in enumerate((0, 2)):
-            way = motion[px][side : side + 2] / factors[k] / STEP
-            ends.append(toward(small[1], small[side], x, y, way))
+        ways = [motion[px][2 * k : 2 * k + 2] / factors[k] for k in (0, 1)]
+        ends = [toward(small[1], small[2 * k], x, y, ways[k] / STEP) for k in (0, 1)]
         lost = (1 - ends[0][1]) * (1 - ends[1][1])
         free = 1 - held(holdout, x, y)
-        for k, (gained, same, stands) in enumerate(ends):
-            stands *= len(parts) == 1
+        for k, (gained, same, near) in enumerate(ends):
+            stands = near * resting(ways[k], ways[1 - k]) * (len(parts) == 1)
             changes[y, x] += free * shares[k] * (1 - stands) * (same + lost) * gained
             standing[y, x, k] = free * shares[k] * stands
     expected = pictures[1].astype(np.float64)
@@ -181,15 +184,21 @@ def share_taken(got, pictures):
     return ((got - pictures[1]) * fade).sum() / (fade * fade).sum()
 
 
-def test_noise_is_averaged_where_a_picture_stands(device):
+@pytest.mark.parametrize("found, least", [(0.3, 0.8), (1.5, 0.6)])
+def test_noise_is_averaged_where_a_picture_stands(device, found, least):
+    """Also where motion is found in it, there and back."""
     pictures = {k: noisy(k) for k in range(3)}
-    motion = np.full((HEIGHT, WIDTH, 4), 0.3, np.float32)  # what is found in noise
-    assert share_taken(changed(device, pictures, motion, (0.0625, 0.0625)), pictures) > 0.8
+    motion = np.full((HEIGHT, WIDTH, 4), found, np.float32)
+    assert share_taken(changed(device, pictures, motion, (0.0625, 0.0625)), pictures) > least
     parts = changed(device, pictures, motion, (0.0625, 0.0625), parts=(0.5, 0.5))
     assert share_taken(parts, pictures) < 0.1  # these are averaged as they are
-    motion[:] = 6
-    moving = {k: np.roll(noisy(k), 6 * (k - 1), (0, 1)) for k in range(3)}
-    got = changed(device, moving, motion * [-1, -1, 1, 1], (0.0625, 0.0625))
+
+
+@pytest.mark.parametrize("speed", [2, 6])
+def test_a_pan_is_not_averaged(device, speed):
+    motion = np.full((HEIGHT, WIDTH, 4), speed, np.float32) * [-1, -1, 1, 1]
+    moving = {k: np.roll(noisy(k), speed * (k - 1), (0, 1)) for k in range(3)}
+    got = changed(device, moving, motion.astype(np.float32), (0.0625, 0.0625))
     assert share_taken(got, moving) < 0.1
 
 

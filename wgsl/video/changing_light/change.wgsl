@@ -6,7 +6,7 @@
 struct End {
     gained: vec3f,      // light at the end of a way, less that at its start; none for noise
     same: f32,          // 0 to 1: how far the same is seen there
-    stands: f32,        // 0 to 1: how far it is the same place, and little apart
+    near: f32,          // 0 to 1: how far light there is little apart
 }
 
 struct Light {
@@ -39,7 +39,8 @@ const FAR: f32 = 0.235;         // mean difference of something else,
 const NEAR: f32 = 0.1;          // of what may as well be something else, as a fade does little harm,
 const NOISE: f32 = 0.0157;      // and of nothing
 const LEAST: f32 = 1.5e-5;      // variance
-const STILL: f32 = 1.0;         // px of motion, standard deviation of what stands
+const STILL: f32 = 1.0;         // px of motion, standard deviation of what stands,
+const JITTER: f32 = 3.0;        // and of motion there and back
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -52,14 +53,25 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if light.exist.x == 1u { back = toward(PREVIOUS, vec2i(id.xy), ways.xy); }
     if light.exist.y == 1u { ahead = toward(NEXT, vec2i(id.xy), ways.zw); }
     let lost = (1.0 - back.same) * (1.0 - ahead.same);  // what neither shows is not there all the time
-    let moving = (1.0 - vec2f(back.stands, ahead.stands)) * (vec2f(back.same, ahead.same) + lost);
+    let full = f32(STEP) * ways;
+    let rests = vec2f(resting(full.xy, full.zw), resting(full.zw, full.xy));
+    let stands = f32(light.whole) * rests * vec2f(back.near, ahead.near);
+    let moving = (1.0 - stands) * (vec2f(back.same, ahead.same) + lost);
     let change = light.shares.x * moving.x * back.gained + light.shares.y * moving.y * ahead.gained;
     let before = select(sums[index].xyz, vec3f(0.0), light.begins == 1u);
     let free = 1.0 - held(id.xy);
     let sum = vec4f(before + free * change, 0.0);
     sums[index] = sum;
     textureStore(changes, id.xy, sum);
-    textureStore(standing, id.xy, vec4f(free * light.shares * vec2f(back.stands, ahead.stands), 0.0, 0.0));
+    textureStore(standing, id.xy, vec4f(free * light.shares * stands, 0.0, 0.0));
+}
+
+/// How far a pixel rests that has this way to a neighbour and that to the other [px], 0 to 1: one that hardly moves, or seems
+/// to move there and back, as in noise and jitter. What really moves goes on.
+fn resting(way: vec2f, other: vec2f) -> f32 {
+    let on = (way - other) / (2.0 * STILL);
+    let back = (way + other) / (2.0 * JITTER);
+    return exp(-min(dot(way, way) / (STILL * STILL), dot(on, on) + dot(back, back)) / 2.0);
 }
 
 /// The most that is held out of the pixels that a small pixel's change reaches.
@@ -103,12 +115,10 @@ fn toward(other: u32, px: vec2i, way: vec2f) -> End {
     let far = dot(abs(apart), vec3f(1.0 / 3.0)) / count;
     let lit = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR));
     let near = exp(-far * far / (NEAR * NEAR));
-    let moved = f32(STEP) * way / STILL;
-    let stands = select(0.0, near * exp(-dot(moved, moved) / 2.0), light.whole == 1u);
     let own = textureLoad(here, px, 0).rgb;
     let found = between(other, to);
     let gained = (1.0 - exp(-far * far / (NOISE * NOISE))) * (found * found - own * own);
-    return End(gained, max(lit, near), stands);
+    return End(gained, max(lit, near), near);
 }
 
 /// Another picture between its pixels, whose centres are whole numbers.
