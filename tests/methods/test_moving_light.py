@@ -30,6 +30,9 @@ SPEED = (4.0, -1.5)  # of the shadow [px per frame]
 PAN = (1.25, 0.5)  # of everything [px per frame]
 
 
+AT_REST = {"pan": (0, 0), "scale": 2}
+
+
 def ground(x, y):
     """A textured surface."""
     wave = np.sin(0.7 * x) * np.cos(0.55 * y + 0.2 * x)
@@ -44,9 +47,10 @@ def shadow(x, y, t, radius):
     return (1 - 0.85 * disc)[..., None] * (1 - 0.5 * bar)[..., None] * np.array([1.1, 1, 0.9])
 
 
-def scene(t, pan=PAN, glossy=False, size=SIZE, still=False, radius=8):
-    """The frame at the time t, without neighbours, with passes of light."""
-    x, y = twin.centres(size)
+def scene(t, pan=PAN, glossy=False, size=SIZE, still=False, radius=8, scale=1):
+    """The frame at the time t, without neighbours, with passes of light; `scale` times as large."""
+    size = size[0] * scale, size[1] * scale
+    x, y = (at / scale for at in twin.centres(size))
     x, y = x - pan[0] * t, y - pan[1] * t
     albedo, light = ground(x, y), shadow(x, y, 0 if still else t, radius)
     motion = np.broadcast_to(np.array([-pan[0], -pan[1], *pan]), (*size, 4))
@@ -92,6 +96,13 @@ def around(**how):
     return scene(0, **how).between(scene(-1, **how), scene(1, **how))
 
 
+def bare(frame):
+    """The frame and its neighbours without passes of light."""
+    none = {"diffuse_light": None, "diffuse_color": None, "prev": None, "next": None}
+    one, before, after = (replace(f, **none) for f in (frame, frame.prev, frame.next))
+    return one.between(before, after)
+
+
 def truth(shutter, **how):
     """The mean over the shutter's time."""
     times = shutter.sample_times(64).astype(float)
@@ -111,35 +122,45 @@ def device():
 class Stages:
     """All that the passes of one kind of light wrote."""
 
-    def __init__(self, device, pulled, whole=None, fold=0.0):
-        """`fold`: from the middle of the shadow on, depth grows by this share per pixel."""
+    def __init__(self, device, pulled, whole=None, fold=0.0, resting=False):
+        """`fold`: from the middle of the shadow on, depth grows by this share per pixel. `resting`:
+        a pixel of light is 2 x 2; what is on the left moves.
+        """
         pool, light = TexturePool(device), MovingLight(device)
-        whole = whole or around(glossy=pulled)
-        self.pulled = pulled
+        scale = 2 if resting else 1
+        size = SIZE[0] * scale, SIZE[1] * scale
+        whole = whole or around(glossy=pulled, **AT_REST if resting else {})
+        self.pulled, self.resting = pulled, resting
         assert whole.prev is not None and whole.next is not None
         self.frames, seen = {}, {}
         for offset, frame in ((0, whole), (-1, whole.prev), (1, whole.next)):
             given = frame.glossy_light if pulled else frame.diffuse_light
+            if resting:
+                given = frame.color[..., :3]
             assert given is not None and frame.depth is not None and frame.motion is not None
             rng = np.random.default_rng(offset + 5)
-            edges = rng.random(SIZE) < 0.002
-            folded = frame.depth * (1 + fold * np.maximum(np.arange(SIZE[1]) - 36, 0))
-            depth = np.where(edges, 14, folded).astype("f4")
-            light_there = np.dstack([given, np.ones(SIZE, "f4")])
+            edges = rng.random(size) < 0.002
+            beyond = np.maximum(np.arange(size[1]) / scale - 36, 0)
+            depth = np.where(edges, 14, frame.depth * (1 + fold * beyond)).astype("f4")
+            motion = np.array(frame.motion)
+            if resting:
+                motion[:, :18] = 0.5
+            light_there = np.dstack([given, np.ones(size, "f4")])
             seen[offset] = SurfaceLight(
                 pool.upload(f"light {offset}", light_there, "rgba32float"),
                 pool.upload(f"depth {offset}", depth, "r32float"),
-                pool.upload(f"motion {offset}", frame.motion, "rgba32float"),
+                pool.upload(f"motion {offset}", motion, "rgba32float"),
             )
-            self.frames[offset] = {"light": given, "depth": depth, "motion": frame.motion}
+            given = {"light": given, "depth": depth, "motion": motion}
+            self.frames[offset] = twin.reduced(given, 2) if resting else given
         color = whole.glossy_color if pulled else whole.diffuse_color
         assert color is not None
-        self.albedo = color
+        self.albedo = np.ones((*SIZE, 3)) if resting else color
         albedo = pool.upload("albedo", np.dstack([color, color[..., :1]]), "rgba32float")
-        bindings = Blur("gather", device=device).frame_bindings(SIZE[::-1])
+        bindings = Blur("gather", device=device).frame_bindings(size[::-1])
         self.times = LightTimes.within(-0.5, 0.5, 4)
         encoder = device.create_command_encoder()
-        kinds = [Kind(pulled, seen, albedo)]
+        kinds = [Kind(pulled, seen, None if resting else albedo, resting, resting)]
         done = light.encode(encoder, bindings, kinds, self.times, None)
         gpu.submit(device, encoder)
         self.found = np.frombuffer(device.queue.read_buffer(done.change_flags), np.uint32)
@@ -171,16 +192,17 @@ class Stages:
         return self._pool.download(encoder, one).astype(float)
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["shadows", "reflections"])
+@pytest.fixture(scope="module", params=["shadows", "reflections", "resting"])
 def stages(request, device):
-    return Stages(device, request.param, fold=0.05)
+    kind = request.param
+    return Stages(device, kind == "reflections", fold=0.05, resting=kind == "resting")
 
 
 def test_what_changes_is_its_twin(stages, close):
     here = stages.frames[0]
     assert stages.found[0] == 1
     for side in (-1, 1):
-        change, seen = twin.measure(here, stages.frames[side], side, stages.pulled)
+        change, seen = twin.measure(here, stages.frames[side], side, stages.pulled, stages.resting)
         assert 0.5 < seen.mean() < 0.99
         want = twin.limited(change, seen, here["light"], stages.albedo, stages.pulled)
         got = stages[f"changes {side}"]
@@ -231,8 +253,8 @@ def test_far_from_moving_light_the_picture_is_that_without():
 def test_values_are_their_twin(stages, close):
     before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
     here = stages.frames[0]
-    bright = 0.0
-    if not stages.pulled:
+    bright = -np.inf
+    if not (stages.pulled or stages.resting):
         bright = twin.closed(here["light"], here["depth"], before, after, 12)
     for offset, change in ((0, 0 * before), (-1, before), (1, after)):
         want = twin.values(here["light"], before, after, bright, change, stages.pulled)
@@ -367,16 +389,42 @@ def change_by_twin(stages, time):
         a = twin.pushed(own, flows[0][..., :2], trusts[0], share)
         b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
         explains = flows[0][..., 3]
-        change, trusted = twin.from_pushed(a, b, own, other, trusts, explains, share)
+        change, trusted = twin.from_pushed(
+            a, b, own, other, trusts, explains, share, stages.resting
+        )
     hidden = np.any([stages[f"changes {i}"][..., 3] == 0 for i in (-1, 1)], axis=0)
     hidden &= not stages.pulled
     sure = twin.sure(own, other, flows, trusted, stages.pulled)
     return twin.clamped(change, before, after, hidden, own), sure
 
 
+def test_flow_on_what_rests_has_to_explain_more(device):
+    """The frame has no shadow, and alone is bright where those before and after it meet."""
+    before, after = (scene(t, radius=6, **AT_REST) for t in (-1, 1))
+    whole = scene(0, radius=-9, **AT_REST).between(before, after)
+    stages = Stages(device, False, whole, resting=True)
+    own, depth = stages["values 0"][..., 3], stages.frames[0]["depth"]
+    near, still = stages.tiles(4), np.zeros((*SIZE, 2))
+    flows = {side: stages[f"flow ahead {side}"] for side in (-1, 1)}
+    sides = {side: stages[f"values {side}"][..., 3] for side in (-1, 1)}
+    alone = np.maximum(np.minimum(sides[-1], sides[1]) - own, 0)
+    assert alone.max() > 0.01
+    found = {side: stages[f"explained {side}"] for side in (-1, 1)}
+    for side, other in sides.items():
+        seen, back = stages[f"changes {side}"][..., 3] > 0, stages[f"flow back {side}"][..., :2]
+        want = twin.explained(
+            flows[side][..., :2], back, own, other, flows[-side], still, depth, seen, near, alone
+        )
+        assert np.mean(np.abs(want - found[side])[near[::2, ::2]] > 5e-3) < 0.03
+        best = twin.chosen(flows[side], flows[-side], still, found[side], found[-side], True)
+        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
+        differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
+        assert np.mean(differs > 5e-2) < 0.02
+
+
 def test_what_is_added_is_its_twin(stages, close):
     before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
-    here = stages.frames[0]
+    here = {"light": np.ones((*SIZE, 3)) - 0.02} if stages.resting else stages.frames[0]
     moved = 0.0
     for i, time in enumerate(stages.times):
         change, sure = change_by_twin(stages, time)
@@ -487,14 +535,46 @@ def test_light_that_rests_changes_no_bit():
     np.testing.assert_array_equal(on, off)
 
 
-def test_frames_without_passes_change_no_bit():
-    whole = around()
-    bare = [replace(f, diffuse_light=None) for f in (whole, whole.prev, whole.next)]
-    frame = bare[0].between(bare[1], bare[2])
+def test_moving_surfaces_without_passes_change_no_bit():
+    frame = bare(around())
     off, auto = (Blur("gather", shading=s)(frame) for s in ("off", "auto"))
     np.testing.assert_array_equal(auto, off)
     with pytest.raises(InputError, match="needs passes of light"):
         Blur("gather", shading="passes")(frame)
+
+
+@pytest.mark.covers(0)
+@pytest.mark.parametrize(("scale", "width"), [(2, 71), (4, 250)], ids=["2 px", "4 px"])
+def test_shadows_on_what_rests_need_no_passes(scale, width):
+    """A pixel of light is 2 x 2 or 4 x 4. Where pixels have weights, nothing is followed."""
+    how = {"pan": (0, 0), "size": (SIZE[0], width), "radius": 3, "scale": scale}
+    frame, want = bare(around(**how)), truth(Shutter(360), **how)
+    off, auto = (Blur("gather", shutter=360, shading=s) for s in ("off", "auto"))
+    assert error(auto(frame), want) < 0.6 * error(off(frame), want)
+    masked = [
+        replace(f, holdout=np.eye(*frame.depth.shape, dtype="f4"))
+        for f in (frame, frame.prev, frame.next)
+    ]
+    masked = masked[0].between(masked[1], masked[2])
+    np.testing.assert_array_equal(auto(masked), off(masked))
+
+
+def test_a_bright_reflection_is_no_shadow():
+    """Unasked, nothing is followed where the frame alone is bright."""
+    x, _ = twin.centres((90, 140))
+
+    def lit(t):
+        bar = np.exp(-0.5 * ((x - 70 - 14 * t) / 3) ** 2)[..., None]
+        color = 0.3 + 0.2 * np.sin(x)[..., None] * np.ones(3) + 0.4 * bar
+        return Frame(color=color.astype("f4"), motion=np.zeros((90, 140, 4), "f4"),
+                     depth=np.full((90, 140), 7, "f4"))  # fmt: skip
+
+    frame = lit(0).between(lit(-1), lit(1))
+    want = np.mean([lit(t).color for t in Shutter(180).sample_times(64).astype(float)], 0)
+    off, auto, frames = (
+        error(Blur("gather", shading=s)(frame), want) for s in ("off", "auto", "frames")
+    )
+    assert auto < 1.01 * off < frames
 
 
 def test_colours_alone_tell_of_shadows():

@@ -72,7 +72,25 @@ def _weight(u, i):
     )[i]
 
 
-def measure(here, there, side, pulled=False):
+def reduced(frame, scale):
+    """The frame with a pixel for every square: its mean light, depth and motion of the nearest."""
+    squares = {}
+    for name, array in frame.items():
+        rows, columns = (np.arange(-(-n // scale) * scale) for n in array.shape[:2])
+        whole = array[np.minimum(rows, array.shape[0] - 1)][
+            :, np.minimum(columns, array.shape[1] - 1)
+        ]
+        parts = whole.reshape(len(rows) // scale, scale, len(columns) // scale, scale, -1)
+        parts = np.swapaxes(parts, 1, 2)
+        squares[name] = parts.reshape(*parts.shape[:2], scale * scale, -1)
+    nearest = np.argmin(squares["depth"], axis=2)[:, :, None]
+    depth, motion = (
+        np.take_along_axis(squares[n], nearest, 2)[:, :, 0] for n in ("depth", "motion")
+    )
+    return {"light": squares["light"].mean(2), "depth": depth[..., 0], "motion": motion / scale}
+
+
+def measure(here, there, side, pulled=False, resting=False):
     """log(light there) - log(light here), and whether it is seen; frames: light, depth, motion."""
     way = here["motion"][..., 2:] if side > 0 else here["motion"][..., :2]
     back_there = there["motion"][..., :2] if side > 0 else there["motion"][..., 2:]
@@ -88,6 +106,8 @@ def measure(here, there, side, pulled=False):
     whole = [plain(f["depth"], f["motion"]) for f in (here, there)]
     whole = [np.min([shifted(w, i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)], 0) for w in whole]
     seen &= whole[0] & whole[1][row, column]
+    if resting:
+        seen &= np.all([np.abs(frame["motion"]) < 0.05 for frame in (here, there)], axis=(0, 3))
     e = dark(pulled)
     change = np.log(cubic(there["light"], x, y) + e) - np.log(here["light"] + e)
     return np.where(seen[..., None], change, 0), seen
@@ -433,10 +453,10 @@ def differs_by(to, was, own, other, depth, seen, hidden, known, at=None):
     return total
 
 
-def explained(flow, back, own, other, flow_other, body, depth, seen, known):
+def explained(flow, back, own, other, flow_other, body, depth, seen, known, alone=0.0):
     """Differences with the flow, without, with the other neighbour's and the body's; half size.
 
-    `flow_other`: with its trust.
+    `flow_other`: with its trust. `alone`: by how much the frame alone is bright, where that counts.
     """
     x, y = centres(own.shape)
     unsure = np.where(seen, 1, 0.3)
@@ -450,7 +470,8 @@ def explained(flow, back, own, other, flow_other, body, depth, seen, known):
     turned = with_ * (1 - trusted) + turned * trusted
     as_body = differs_by(body, -body, own, other, depth, seen, 0.3, known)
     as_body = np.where(body.any(axis=2), as_body, with_)
-    return blurred(np.dstack([with_, 2 * still, turned, as_body]), 4.0)
+    more = 4 * alone
+    return blurred(np.dstack([with_ + more, 2 * still, turned + more, as_body + more]), 4.0)
 
 
 def nearest(x, y, size):
@@ -460,14 +481,15 @@ def nearest(x, y, size):
     return np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
 
 
-def chosen(flow, flow_other, body, around, around_other):
+def chosen(flow, flow_other, body, around, around_other, resting=False):
     """The flow that explains most, its trust, and how much it explains; around: see explained.
 
     Trust is less than 0 where the flow is not searched.
     """
 
     def share(found, still):
-        return np.clip((0.85 - found / np.maximum(still, 1e-4)) / 0.25, 0, 1)
+        missed = 0.45 if resting else 0.85
+        return np.clip((missed - found / np.maximum(still, 1e-4)) / 0.25, 0, 1)
 
     around, around_other = (doubled(a, flow.shape[:2]) for a in (around, around_other))
     with_, still, turned, as_body = np.moveaxis(around, 2, 0)
@@ -535,17 +557,19 @@ def smooth(x, half):
     return u * u * (3 - 2 * u)
 
 
-def from_pushed(a, b, own, other, trusts, explains, time):
+def from_pushed(a, b, own, other, trusts, explains, time, resting=False):
     """The change of the logarithm of light, from what came from here (a) and from there (b).
 
     `explains`: how much the flow explains, less than 0 where it is not searched: there what covers
-    a part of a pixel is spread over up to twice this part.
+    a part of a pixel is spread over up to twice this part; over four times where surfaces rest.
 
     Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
     """
     amounts = own[..., 3], other[..., 3]
     own, other = own[..., :3], other[..., :3]
     most = np.where(explains < 0, 2, 1)[..., None]
+    if resting:
+        most = 4
     a, b = (one * np.clip(1 / np.maximum(one[..., 3:], 0.01), 1, most) for one in (a, b))
     explains = np.abs(explains)
     late = smooth(time, 0.3)

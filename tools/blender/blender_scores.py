@@ -137,7 +137,8 @@ def page(about: str, table: str, sections: list[str]) -> str:
         + table
         + "\n## The remaining error of gather\n\n"
         "* Shadows and shading that move over a surface, which no vector describes (runner, "
-        "propeller, the shadow of cesium_man).\n"
+        "propeller, the shadow of cesium_man); clear ones on what rests are followed "
+        "(c_crossing).\n"
         "* Surfaces that all three frames hide: they are filled smoothly, without texture "
         "(c_crossing).\n"
         "* A silhouette that turns under its own outline (milk_truck's tyres at their arches).\n"

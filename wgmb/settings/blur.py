@@ -83,9 +83,16 @@ class BlurSettings:
         return replace(self, method=self.method or suited)
 
     def for_pictures(self) -> Self:
-        """Return a copy for motion found in pictures, after `resolved`: unset samples are auto."""
-        adaptive = self.method in METHODS and getattr(METHODS[self.method], "adaptive", False)
-        return replace(self, samples="auto") if adaptive and self.samples is None else self
+        """Return a copy for motion found in pictures, after `resolved`: unset samples are auto, and
+        unset shading is off, as what seems to rest there may move.
+        """
+        method = METHODS.get(self.method or "")
+        unset: dict[str, Any] = {}
+        if getattr(method, "adaptive", False) and self.samples is None:
+            unset["samples"] = "auto"
+        if method and "shading" in set(options_of(method.Options)) - set(self._method_options()):
+            unset["shading"] = "off"
+        return replace(self, **unset)
 
     def make(self, shutter_: Shutter, device: wgpu.GPUDevice | str | None = None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from ...errors import InputError
@@ -14,7 +15,11 @@ PASSES = frozenset(name for pair in PAIRS for name in pair)
 
 
 def kinds_of(inputs: Inputs, shading: Shading) -> list[Kind]:
-    """The kinds of light that are followed; none: shading stays that of the frame."""
+    """The kinds of light that are followed; none: shading stays that of the frame.
+
+    Without passes, a frame's colours tell of the light on what rests, if its vectors do so and
+    pixels have no weights.
+    """
     if shading == "off":
         return []
     if shading == "frames":
@@ -28,7 +33,9 @@ def kinds_of(inputs: Inputs, shading: Shading) -> list[Kind]:
             '`shading` "passes" needs passes of light: diffuse_light and diffuse_color, or '
             "glossy_light and glossy_color"
         )
-    return found
+    if found or shading == "passes" or inputs.frame.by_camera or inputs.frame.weight is not None:
+        return found
+    return [replace(kind, resting=True) for kind in _kind(inputs, "color", None, False)]
 
 
 def _kind(inputs: Inputs, light: str, color: str | None, pulled: bool) -> list[Kind]:

@@ -37,6 +37,7 @@ class Search:
             self._device,
             "methods/gather/search/classify.wgsl",
             MOVING_LIGHT=added is not None,
+            LIGHT_SCALE=added.scale if added else 1,
             **timed,
         )
         data = np.zeros((), classify.source.dtype("SourceFrames"))
@@ -105,6 +106,8 @@ class Search:
                 CONFIDENCE=self._confidence,
                 **kind,
                 MOVING_LIGHT=moving is not None,
+                LIGHT_SCALE=moving.scale if moving else 1,
+                RESTING=moving is not None and moving.resting,
                 **timed,
             )
             kernel.run(

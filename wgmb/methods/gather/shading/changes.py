@@ -29,6 +29,49 @@ def screen(stage: Stage, frames: Mapping[int, SurfaceLight]) -> None:
             stage.run("changes/screen", **_both(stage, frames[0], other, offset))
 
 
+def at_rest(stage: Stage, frames: Mapping[int, SurfaceLight], scale: int) -> None:
+    """The same of surfaces that rest; a pixel of the `stage` is `scale` pixels wide."""
+    here = frames[0]
+    for offset, there in frames.items():
+        if offset:
+            stage.run(
+                "changes/still",
+                constants={"SCALE": scale},
+                light_here=here.light,
+                light_there=there.light,
+                depth_here=here.depth,
+                depth_there=there.depth,
+                motion_here=here.motion,
+                motion_there=there.motion,
+            )
+
+
+def reduced(
+    stage: Stage, frames: Mapping[int, SurfaceLight], scale: int
+) -> dict[int, SurfaceLight]:
+    """The frames at the size of the `stage`; undefined if no tile is doubtful."""
+    result = {}
+    for offset, frame in frames.items():
+        less = SurfaceLight(
+            stage.texture(f"light {offset}", "rgba16float"),
+            stage.texture(f"depth {offset}", "r32float"),
+            stage.texture(f"motion {offset}", "rgba32float"),
+        )
+        stage.run(
+            "changes/reduced",
+            over="whole",
+            constants={"SCALE": scale},
+            light=frame.light,
+            depth=frame.depth,
+            motion=frame.motion,
+            less_light=less.light,
+            less_depth=less.depth,
+            less_motion=less.motion,
+        )
+        result[offset] = less
+    return result
+
+
 def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
     """Bindings of passes that compare the frame with the neighbour at `offset`."""
     return {
@@ -53,14 +96,13 @@ def changes(
     stage's change flags are told. Known in the tiles that `screen` has found doubtful.
     """
     here = frames[0]
+    distrusts = by_color and not stage.resting  # of what rests, texture is in register
     plain = {}
     for offset, frame in frames.items():
-        entry, over = ("everywhere", None) if offset else ("main", "doubtful")
         plain[offset] = (stage.texture if offset else stage.sparse)(f"plain {offset}", "r32uint")
         stage.run(
             "changes/plain",
-            entry,
-            over=over,
+            over="whole" if offset else "doubtful",
             depth=frame.depth,
             motion=frame.motion,
             plain=plain[offset],
@@ -97,13 +139,13 @@ def changes(
             ("find_gain", smooth, peaks, four, gain),
             ("limit_ratio", smooth, gain, limited, one),
         ):
-            if entry == "find_coherence" and not by_color:
+            if entry == "find_coherence" and not distrusts:
                 continue
             stage.run(
                 "changes/gain",
                 entry,
                 over="doubtful",
-                constants={"HAS_ALBEDO": albedo is not None, "COLORS": by_color},
+                constants={"HAS_ALBEDO": albedo is not None, "COLORS": distrusts},
                 ratio=ratio,
                 scalar=scalar,
                 light_here=here.light,

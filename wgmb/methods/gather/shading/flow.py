@@ -121,7 +121,8 @@ def _extrapolated(
     def run(entry: str, side: int, **bindings: Any) -> None:
         way, other = searched[side], searched.get(-side)
         given: dict[str, Any] = {
-            "values": values[0], "values_there": values[side], "change": changed[side],
+            "values": values[0], "values_there": values[side],
+            "values_other": values.get(-side, none), "change": changed[side],
             "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
             "bodies": bodies, "others": none, "around": wide, "around_other": wide,
             "flow_out": spare, "bodies_out": spare, "others_out": spare,

@@ -10,9 +10,10 @@ from typing import Any
 
 import wgpu
 
+from .... import gpu
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer, TexturePool
-from .changes import SurfaceLight, View, changes, screen
+from .changes import SurfaceLight, View, at_rest, changes, reduced, screen
 from .flow import (
     LightFlow,
     flows,
@@ -24,6 +25,7 @@ from .stage import FOLDER, GATES_SIZE, Stage
 from .values import values
 
 _LISTS = "doubtful", "changing", "beside", "near", "whole"  # of tiles: see near.wgsl
+LONGEST = 480  # px of light along the longer side of an image, on what rests, at most
 NODES = 8  # times of an exposure at which light is known, at most
 
 
@@ -51,13 +53,15 @@ class Kind:
     """One kind of light in up to three frames, by their offsets; 0 is the frame itself.
 
     `pulled`: reflections; else shadows. `albedo`: None is 1 everywhere. `by_color`: the light is
-    the picture itself.
+    the picture itself; `resting`: on surfaces that rest, see `scale_of`. No other kind comes with
+    it.
     """
 
     pulled: bool
     frames: Mapping[int, SurfaceLight]
     albedo: View | None
     by_color: bool = False
+    resting: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,17 @@ class Added:
 
     `change_flags`: a buffer whose first word is 1 if light changes anywhere; if not, the layers are
     undefined. The others are of tiles, see active.wgsl.
+
+    `scale`: side of a pixel of the layers [px]. `resting`: they are shares of the colours of what
+    rests.
     """
 
     layers: wgpu.GPUTexture
     view: View  # of all layers
     times: LightTimes
     change_flags: wgpu.GPUBuffer
+    scale: int = 1
+    resting: bool = False
 
 
 class MovingLight:
@@ -92,6 +101,14 @@ class MovingLight:
         self, encoder, bindings, kinds: Sequence[Kind], times: LightTimes, weight: View | None
     ) -> Added:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
+        resting = kinds[0].resting
+        scale = scale_of(bindings.size) if resting else 1
+        if resting:
+            width, height = bindings.size
+            less = gpu.FrameBindings.of_size(
+                self._device, (-(-width // scale), -(-height // scale))
+            )
+            bindings = replace(less, groups=bindings.groups)
         tiles = math.prod(_tile_grid(bindings.size))
         sizes = {"change flags": 4 * (1 + tiles), "gates": GATES_SIZE}
         kept = {
@@ -103,17 +120,27 @@ class MovingLight:
         change_flags, gates = kept.pop("change flags"), kept.pop("gates")
         lists: dict[str, Any] = kept
         stage = Stage(
-            self._device, self._images, encoder, bindings, "", False, {}, change_flags, lists
+            self._device, self._images, encoder, bindings, "", False, False, {}, change_flags, lists
         )
         stages = [
-            replace(stage, name="glossy" if kind.pulled else "diffuse", pulled=kind.pulled)
+            replace(
+                stage,
+                name="glossy" if kind.pulled else "diffuse",
+                pulled=kind.pulled,
+                resting=kind.resting,
+            )
             for kind in kinds
         ]
         grid = _tile_grid(stage.size)
         for stage, kind in zip(stages, kinds, strict=True):
-            screen(stage, kind.frames)
+            if resting:
+                at_rest(stage, kind.frames, scale)
+            else:
+                screen(stage, kind.frames)
         stage.run("near", "list_doubtful", size=grid, **lists)
         stage.run("near", "size_doubtful", size=(1, 1), **lists)
+        if resting:
+            kinds = [replace(one, frames=reduced(stage, one.frames, scale)) for one in kinds]
         changed = [
             changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
@@ -127,7 +154,7 @@ class MovingLight:
             earlier = self._layers(stage, kind, by_side, times, weight, earlier)
         assert earlier is not None, "no kind of light"
         every = self._images.view_of(earlier, dimension="2d-array")
-        return Added(earlier, every, times, change_flags)
+        return Added(earlier, every, times, change_flags, scale, resting)
 
     def _layers(
         self,
@@ -224,6 +251,14 @@ def _carry(stage: Stage, darkness: View, ways: Mapping[int, LightFlow], times: L
         )
     lists: dict[str, Any] = dict(stage.lists)
     replace(stage, gates={}).run("near", "size_lists", size=(1, 1), **lists)
+
+
+def scale_of(size: tuple[int, int]) -> int:
+    """Side of the squares of an image that stand for a pixel of light on what rests [px]."""
+    scale = 2
+    while max(size) > scale * LONGEST:
+        scale *= 2
+    return scale
 
 
 def _tile_grid(size: tuple[int, int]) -> tuple[int, int]:

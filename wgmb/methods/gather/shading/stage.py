@@ -25,10 +25,10 @@ GATES_SIZE = 4 * 3 * _GATES  # bytes
 class Stage:
     """Records passes over `bindings.size` into `encoder`.
 
-    `name`: of the kind of light. `gates`: workgroups of passes by their sizes; none: all run.
-    `change_flags`: see Added. `lists`: of tiles in which light is "doubtful" and "changing", of
-    those "near" these, and of the "whole" image; empty if light changes nowhere. `begun`: names of
-    sparse textures that are clear of the frame before.
+    `name`: of the kind of light; `pulled`, `resting`: see Kind. `gates`: workgroups of passes by
+    their sizes; none: all run. `change_flags`: see Added. `lists`: of tiles in which light is
+    "doubtful" and "changing", of those "near" these, and of the "whole" image; empty if light
+    changes nowhere. `begun`: names of sparse textures that are clear of the frame before.
     """
 
     device: wgpu.GPUDevice
@@ -37,6 +37,7 @@ class Stage:
     bindings: gpu.FrameBindings
     name: str
     pulled: bool
+    resting: bool
     gates: dict[tuple[int, int], dict]
     change_flags: wgpu.GPUBuffer
     lists: Mapping[str, wgpu.GPUBuffer]
@@ -91,6 +92,8 @@ class Stage:
         takes = _takes(path)
         if takes.kind:
             given["PULLED"] = self.pulled
+        if takes.resting:
+            given["RESTING"] = self.resting
         texels = {name: gpu.stored(resources[name]) for name in takes.textures}
         kernel = gpu.kernel(self.device, path, texels, **given)
         size = size or self.size
@@ -125,9 +128,10 @@ class Stage:
 
 
 class _Takes(NamedTuple):
-    """Bindings and constants of a file: kind of light, list of tiles, flags, textures as given."""
+    """Bindings and constants of a file: kinds of light, list of tiles, flags, textures as given."""
 
     kind: bool
+    resting: bool
     listed: bool
     flags: bool
     textures: tuple[str, ...]
@@ -137,4 +141,5 @@ class _Takes(NamedTuple):
 def _takes(path: str) -> _Takes:
     text = wgsl.load(path).text
     textures = tuple(re.findall(r"var (\w+): .*// stored as given", text))
-    return _Takes("override PULLED" in text, "> listed:" in text, "> found:" in text, textures)
+    pulled, resting = (f"override {name}" in text for name in ("PULLED", "RESTING"))
+    return _Takes(pulled, resting, "> listed:" in text, "> found:" in text, textures)

@@ -20,7 +20,9 @@ def values(
     """
     none = stage.none("rgba16float")
     sides: dict[str, Any] = {"before": changed.get(-1, none), "after": changed.get(1, none)}
-    closed = none if stage.pulled else _closed(stage, here, sides, 0 if by_color else STEPS)
+    closed = none
+    if not (stage.pulled or stage.resting):
+        closed = _closed(stage, here, sides, 0 if by_color else STEPS)
     result = {}
     for offset in (0, *changed):
         name, format = f"values {offset}", "rgba16float"

@@ -133,7 +133,7 @@ fn handicap_of(f: u32) -> f32 {
 /// True if a place that a block shows may be where light changes: a surface goes there from its place in this frame.
 fn may_be_lit(block: Block) -> bool {
     let way = max(way_of(block.a, 0u), max(way_of(block.b, 1u), way_of(block.c, 2u)));
-    let reach = (way + f32(BLOCK)) / f32(LIGHT_TILE) + 1.0;
+    let reach = (way + f32(BLOCK)) / f32(LIGHT_TILE * LIGHT_SCALE) + 1.0;
     let distance = light_changes[1u + light_tile(block.low)] >> DISTANCE_BITS;
     return f32(distance) <= reach || reach >= f32(FAR_TILES);
 }

@@ -45,7 +45,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, around: f32,
         if back_edge && n == 1u { part = visible.back_edge; }
         if front_edge && n == 0u { part = visible.front_edge; }
         var one = texels_of(part, t, around, step, n < parts);
-        if MOVING_LIGHT && n < parts { one.color += one.coverage * moving_light(part.at, part.layer, t, duration); }
+        if MOVING_LIGHT && n < parts { one.color += moving_light(one.color, one.coverage, part.at, part.layer, t, duration); }
         one.residual = one.coverage * sqrt(part.residual2);
         var from_around = part.layer > 1u;
         if CONFIDENCE && part.layer == 1u {
@@ -64,7 +64,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, around: f32,
         if WEIGHTED { counts = matte_at(nearest_pixel(at), layer / 2u).weight; }
         let neighbours = select(0.0, 1.0, visible.opaque.layer > 1u);
         var color = passing(at, layer, t, around, step);
-        if MOVING_LIGHT { color += moving_light(at, visible.opaque.layer, t, duration); }
+        if MOVING_LIGHT { color += moving_light(color, 1.0, at, visible.opaque.layer, t, duration); }
         var one = Composite(color, counts, 1.0, sqrt(visible.opaque.residual2), neighbours, 0.0);
         if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, layer, t, duration); }
         add(&sum, one, 1.0 - sum.coverage);

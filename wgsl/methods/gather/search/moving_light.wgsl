@@ -5,6 +5,7 @@
 //#include common/shutter.wgsl
 //#include methods/gather/search/search.wgsl
 //#include methods/gather/shading/active.wgsl
+//#include methods/gather/shading/rests.wgsl
 
 struct LightNodes {
     first: f32,         // time of the first one [frame intervals]
@@ -18,6 +19,7 @@ struct LightNodes {
 @group(1) @binding(14) var<storage, read> light_changes: array<u32>;    // one word, then those of tiles: see active.wgsl
 
 override MOVING_LIGHT: bool = false;    // whether there is any
+override RESTING: bool = false;     // it is told of surfaces that rest, as a share of their colour
 
 const SAME_SURFACE: f32 = 1.0;  // a way there and back ends no farther than this from where it began [px]
 
@@ -33,9 +35,14 @@ fn is_light_moving(at: vec2f) -> bool {
     return (light_changes[1u + light_tile(px)] & CHANGES) != 0u;
 }
 
-/// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`.
-fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
-    if layer == 0u { return vec4f(light_during(at, t, duration).rgb, 0.0); }
+/// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`: what is added to its `color`, which covers this
+/// much of the pixel.
+fn moving_light(color: vec4f, coverage: f32, at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
+    if layer == 0u {
+        var added = coverage * light_during(at, t, duration).rgb;
+        if RESTING { added = select(vec3f(0.0), (color.rgb + coverage * DARK) * light_during(at, t, duration).rgb, rests_at(at)); }
+        return vec4f(added, 0.0);
+    }
     let f = layer / 2u;
     let offset = offset_of(min(f, 2u));
     let surface = surface_of(vec2i(floor(at)), min(layer, 5u));
@@ -44,10 +51,25 @@ fn moving_light(at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     let own = surface_of(vec2i(floor(here)), 0u);
     let back = here + displacement5(unpack_trajectory(own), offset) - at;
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
-    let there = textureSampleLevel(added_light, linear, here / vec2f(frame.size), node, 0.0);
+    let there = textureSampleLevel(added_light, linear, light_uv(here), node, 0.0);
     let same = layer % 2u == 0u && layer < 2u * sources.count && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
-    let change = light_during(here, t, duration).rgb - there.rgb;
+    var change = coverage * (light_during(here, t, duration).rgb - there.rgb);
+    if RESTING {
+        let share = (1.0 + light_during(here, t, duration).rgb) / (1.0 + there.rgb) - 1.0;
+        change = select(vec3f(0.0), (color.rgb + coverage * DARK) * share, rests_at(here));
+    }
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
+}
+
+/// True if what this frame shows at a place [px] rests.
+fn rests_at(at: vec2f) -> bool {
+    let trajectory = unpack_trajectory(surface_of(vec2i(floor(at)), 0u));
+    return rests(vec4f(displacement5(trajectory, -1.0), displacement5(trajectory, 1.0)));
+}
+
+/// Where in the layers of added light a place [px] is.
+fn light_uv(at: vec2f) -> vec2f {
+    return at / f32(LIGHT_SCALE) / vec2f(textureDimensions(added_light));
 }
 
 /// Uncertainty of the light of such a sample, from 0 to 1.
@@ -63,7 +85,7 @@ fn light_unknown(at: vec2f, layer: u32, t: f32, duration: f32) -> f32 {
 /// Addition at a place of this frame [px]: the mean over a time. a: its confidence.
 fn light_during(at: vec2f, t: f32, duration: f32) -> vec4f {
     if !is_light_moving(at) { return vec4f(0.0, 0.0, 0.0, 1.0); }
-    let uv = at / vec2f(frame.size);
+    let uv = light_uv(at);
     let last = f32(light_nodes.count) - 1.0;
     let half = max(0.5 * duration / light_nodes.step, 0.5);
     let u = clamp((t - light_nodes.first) / light_nodes.step, half - 0.5, max(last - half + 0.5, half - 0.5));

@@ -133,7 +133,7 @@ fn add_single(exposure: ptr<function, Exposure>, times: ptr<function, Times>, pi
             let duration = duration_in(pixel.times, first, todo);
             let around = around_in(pixel.times, first, todo);
             var color = passing(at, front, t, around, pixel.step);
-            if MOVING_LIGHT { color += moving_light(at, 0u, t, duration); }
+            if MOVING_LIGHT { color += moving_light(color, 1.0, at, 0u, t, duration); }
             let residual = min(sqrt(found.residual2), HALF_MAX);    // a wild motion may end it anywhere
             var one = Composite(color, counts, 1.0, residual, 0.0, 0.0);
             if CONFIDENCE && MOVING_LIGHT { one.unlit = light_unknown(at, 0u, t, duration); }
@@ -190,7 +190,7 @@ fn add_unresolved(exposure: ptr<function, Exposure>, first: u32, bits: u32, far:
                 let is_behind = abs(unpack_depth(surface_of(vec2i(nearest_pixel(p)), 0u))) * SURFACE_DEPTH_RATIO < z && is_inside(p);
                 let at = select(at_border(p, first + firstTrailingBit(todo)), pixel.x, is_behind);
                 var one = tap(at);
-                if MOVING_LIGHT { one.color += moving_light(at, 0u, t, duration_in(pixel.times, first, todo)); }
+                if MOVING_LIGHT { one.color += moving_light(one.color, one.coverage, at, 0u, t, duration_in(pixel.times, first, todo)); }
                 add_time(exposure, one, pixel.share);
             }
             if !is_inside(p) { (*exposure).left_image += 1.0; }
@@ -243,7 +243,7 @@ fn lit_color(px: vec2u) -> vec4f {
     var sum = vec4f(0.0);
     let count = turns_of(times.count, px.x);
     for (var i = 0u; i < count; i++) {
-        sum += share * moving_light(x, 0u, shutter_time(times, i), sample_duration(times, i));
+        sum += share * moving_light(color, 1.0, x, 0u, shutter_time(times, i), sample_duration(times, i));
     }
     return max(color + sum, vec4f(0.0));
 }

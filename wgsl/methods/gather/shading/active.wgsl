@@ -1,7 +1,8 @@
 // Tiles of pixels by what light does there: far from all changes, costly passes write nothing.
 //#include common/frame.wgsl
 
-const LIGHT_TILE: u32 = 16u;    // side [px]
+const LIGHT_TILE: u32 = 16u;    // side [px of light]
+override LIGHT_SCALE: u32 = 1u; // side of a pixel of light [px]; passes over light alone have 1
 
 // What is known of a tile, bits of its word.
 const MAY_CHANGE: u32 = 1u;     // light differs from frame to frame somewhere in it, if only by noise
@@ -12,8 +13,8 @@ const FAR_TILES: i32 = 8;
 const NEAR_TILES: i32 = 1;     // flow and its means look less far than that
 
 fn light_tile(px: vec2u) -> u32 {
-    let across = (frame.size.x + LIGHT_TILE - 1u) / LIGHT_TILE;
-    return px.y / LIGHT_TILE * across + px.x / LIGHT_TILE;
+    let side = LIGHT_TILE * LIGHT_SCALE;
+    return px.y / side * ((frame.size.x + side - 1u) / side) + px.x / side;
 }
 
 struct FoundTiles {

@@ -18,6 +18,7 @@
 @group(1) @binding(13) var motion: texture_2d<f32>;         // stored as given: to_prev, to_next [px]
 @group(1) @binding(14) var bodies_out: Flow;                // of cells of CELL x CELL pixels, relative to the surface: to_prev, to_next [px]; 0 where there is none
 @group(1) @binding(15) var others: texture_2d<f32>;         // stored as rgba16float, by `find_bodies`
+@group(1) @binding(17) var values_other: texture_2d<f32>;    // stored as rgba16float: of the other neighbour; 1 x 1: there is none
 @group(1) @binding(16) var others_out: Flow;                // as `bodies_out`: of bodies that move otherwise
 
 alias Flow = texture_storage_2d<rgba16float, write>;
@@ -25,16 +26,19 @@ alias Weighted = texture_storage_2d<rgba32float, write>;
 
 override NEXT: bool = false;    // the neighbour is the next frame
 override COLORS: bool = false;  // the light is the picture itself: its differences may be texture, so that a guess has to explain more
+override RESTING: bool = false; // the same on what rests, unasked: flow has to explain nearly all
 override SURE: f32 = select(0.5, 0.75, COLORS);             // how much the motion of a body has to explain
 override BODY_CLEARLY: f32 = select(0.83, 0.75, COLORS);    // as CLEARLY, of a body
 override HIDDEN: f32 = select(0.3, 1.0, COLORS);    // share of what differs without motion that counts where a body hides what it is compared with
 
+override MISSED: f32 = select(0.85, 0.45, RESTING); // share of the differences without flow from which on it explains nothing,
+override EXPLAINED: f32 = select(0.6, 0.2, RESTING);    // and up to which it explains them
+
 const CLEARLY: f32 = 0.75;      // share of other differences from which on less is clearly less
-const MISSED: f32 = 0.85;       // share of the differences without flow from which on it explains nothing,
-const EXPLAINED: f32 = 0.6;     // and up to which it explains them
 const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
 const SOME: f32 = 0.01;         // the same from which on it is told at all
 const UNLIKE: f32 = 0.3;        // difference of values from which on flow around does not fit
+const ALONE_COUNTS: f32 = 4.0;  // how much of a difference it is that this frame alone is bright
 const CELL: u32 = 4u;           // side [px]
 const RINGS: u32 = 8u;          // around a cell, in which bodies are looked for,
 const FIRST_RING: f32 = 3.0;    // [px]
@@ -181,8 +185,16 @@ fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) g
     let extrapolated = differs_by(id, x - turned.xy, came_from(x, turned.xy), 0.0);
     let body = body_at(id);
     let as_body = differs_by(id, x + body, x - body, HIDDEN);
-    textureStore(weighted, id, vec4f(searched, 2.0 * still, mix(searched, extrapolated, turned.z),
-                                     select(as_body, searched, all(body == vec2f(0.0)))));
+    let found = vec4f(searched, 2.0 * still, mix(searched, extrapolated, turned.z),
+                      select(as_body, searched, all(body == vec2f(0.0))));
+    textureStore(weighted, id, found + alone_bright(id) * vec4f(1.0, 0.0, 1.0, 1.0));
+}
+
+/// How much brighter this frame is than both neighbours: where a reflection is that moves, and hardly where a shadow does.
+fn alone_bright(id: vec2u) -> f32 {
+    if !RESTING || textureDimensions(values_other).x == 1u { return 0.0; }
+    let around = min(textureLoad(values_there, id, 0).a, textureLoad(values_other, id, 0).a);
+    return ALONE_COUNTS * max(around - textureLoad(values, id, 0).a, 0.0);
 }
 
 /// The difference of a pixel without motion. Where the neighbour does not show it, all that is there; of colours nothing.

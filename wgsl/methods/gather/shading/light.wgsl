@@ -2,6 +2,7 @@
 //#include common/depth.wgsl
 //#include common/finite.wgsl
 //#include common/frame.wgsl
+//#include methods/gather/shading/rests.wgsl
 
 const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);
 const AS_DEEP_THERE: f32 = 1.15;    // ratio of the depths of the same surface in two frames
@@ -11,7 +12,7 @@ override PULLED: bool = false;      // reflections, which are pulled along their
 
 /// Light below this is dark [linear].
 fn dark() -> f32 {
-    return select(0.02, 0.05, PULLED);
+    return select(DARK, 0.05, PULLED);
 }
 
 /// True if a surface of the depth `z` may be that of the depth `z_there` in a neighbouring frame.

@@ -14,12 +14,17 @@
 fn list_doubtful(@builtin(global_invocation_id) id: vec3u) {
     let tiles = light_tiles();
     if any(id.xy >= tiles) { return; }
+    whole.tiles[id.y * tiles.x + id.x] = id.y * tiles.x + id.x;
     if tiles_to(vec2i(id.xy), MAY_CHANGE, 1) <= 1 { doubtful.tiles[atomicAdd(&doubtful.count, 1u)] = id.y * tiles.x + id.x; }
 }
 
 @compute @workgroup_size(1)
 fn size_doubtful() {
-    doubtful.groups = groups_for(TILE_GROUPS * atomicLoad(&doubtful.count));
+    let tiles = light_tiles();
+    let count = atomicLoad(&doubtful.count);
+    doubtful.groups = groups_for(TILE_GROUPS * count);
+    atomicStore(&whole.count, select(0u, tiles.x * tiles.y, count > 0u));
+    whole.groups = groups_for(TILE_GROUPS * atomicLoad(&whole.count));
 }
 
 /// After `limit_ratio`: an invocation is a tile.
@@ -30,7 +35,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let distance = tiles_to(vec2i(id.xy), CHANGES, FAR_TILES - 1);
     let tile = id.y * tiles.x + id.x;
     atomicOr(&found.tiles[tile], u32(distance) << DISTANCE_BITS);
-    whole.tiles[tile] = tile;
     if distance == 0 { changing.tiles[atomicAdd(&changing.count, 1u)] = tile; }
     if distance > 0 && distance <= NEAR_TILES { beside.tiles[atomicAdd(&beside.count, 1u)] = tile; }
     if distance <= NEAR_TILES {

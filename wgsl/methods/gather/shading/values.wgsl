@@ -13,6 +13,8 @@
 
 alias Values = texture_storage_2d<rgba16float, write>;
 
+override RESTING: bool = false; // the light is the picture itself, on what rests: what is brighter around is another texture
+
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -29,7 +31,8 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         textureStore(values, px, vec4f(level + change, max(apart.r, max(apart.g, apart.b))));
         return;
     }
-    let brightest = max(most, textureLoad(closed, px, 0).rgb - level);
+    var brightest = most;
+    if !RESTING { brightest = max(most, textureLoad(closed, px, 0).rgb - level); }
     let darkness = 1.0 - exp(change - brightest);
     textureStore(values, px, vec4f(darkness, max(dot(darkness, LUMINANCE), 0.0)));
 }

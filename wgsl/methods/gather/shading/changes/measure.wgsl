@@ -11,6 +11,8 @@
 @group(1) @binding(8) var plain_there: texture_2d<u32>;     // stored as r32uint
 @group(1) @binding(9) var ratio: Ratio;     // of light, as a logarithm; a: 1 where the surface is seen there
 
+override RESTING: bool = false;     // only what rests is compared
+
 alias Ratio = texture_storage_2d<rgba16float, write>;
 
 const LEADS_BACK: f32 = 1.0;    // a vector that leads farther away from where it came from [px] is of something else
@@ -30,7 +32,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     let z_there = valid_depth(textureLoad(depth_there, landing, 0).x);
     let as_deep = is_as_deep_there(z, z_there);
     let seen = is_there && as_deep && dot(back, back) < LEADS_BACK * LEADS_BACK
-        && are_plain(px, landing);
+        && are_plain(px, landing) && (!RESTING || (rests(both) && rests(textureLoad(motion_there, landing, 0))));
     let here = valid_light(textureLoad(light_here, px, 0));
     let there = cubic(at);
     let change = log(there + dark()) - log(here + dark());

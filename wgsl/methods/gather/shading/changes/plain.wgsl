@@ -13,14 +13,6 @@ alias Plain = texture_storage_2d<r32uint, write>;
 const APART: f32 = 1.0;         // difference of motions from which on depths that hardly differ are an edge [px]
 const TOUCHING: f32 = 1.01;     // ratio of such depths
 
-/// Of a neighbour: its surfaces may be anywhere.
-@compute @workgroup_size(WG_X, WG_Y)
-fn everywhere(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= frame.size) { return; }
-    textureStore(plain, id.xy, vec4u(u32(is_plain(id.xy))));
-}
-
-/// Of the frame itself.
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);

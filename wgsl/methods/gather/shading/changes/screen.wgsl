@@ -2,12 +2,11 @@
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 //#include methods/gather/shading/active.wgsl
+//#include methods/gather/shading/changes/differs.wgsl
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/changes/both.wgsl
 
 @group(1) @binding(6) var<storage, read_write> found: FoundTiles;
-
-const DIFFERS: f32 = 0.075;     // share of a channel; changes of less than LEAST (gain.wgsl) do not count
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -20,7 +19,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let z_there = valid_depth(textureLoad(depth_there, landing, 0).x);
     let here = valid_light(textureLoad(light_here, px, 0));
     let there = valid_light(textureLoad(light_there, landing, 0));
-    let differs = any(abs(there - here) > DIFFERS * (here + dark()));
     let is_there = all(at >= vec2f(0.0)) && all(at < vec2f(frame.size));
-    if differs && is_there && is_as_deep_there(z, z_there) { atomicOr(&found.tiles[light_tile(id.xy)], MAY_CHANGE); }
+    if differs(here, there) && is_there && is_as_deep_there(z, z_there) { atomicOr(&found.tiles[light_tile(id.xy)], MAY_CHANGE); }
 }
