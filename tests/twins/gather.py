@@ -728,7 +728,7 @@ def iterate_fixed_point(paths, depth, centre, seed, u, nearest, first):
             return d, np.inf, None
         pixel = int(q[1]), int(q[0])
         step = moved(paths[pixel], u)
-        back = np.inf if first is None else np.hypot(*(d - first[0])) / 2
+        back = np.inf if first is None else 0.75 * np.hypot(*(d - first[0]))
         way = complex(*(step - d))
         residual, d = abs(way), step
         if residual < 0.5 or residual > back:  # there, or astray
