@@ -47,7 +47,7 @@ class Gather:
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
     Artefacts: without passes of light, shading is that of one frame, but for clear shadows on what
     rests; surfaces hidden in all frames are filled from their surroundings; those that move more
-    than 256 px by a sample's time may be missed; costs 7 to 26 times as much as taps, and several
+    than 256 px by a sample's time may be missed; costs 7 to 30 times as much as taps, and several
     times that where light moves.
     """
 
