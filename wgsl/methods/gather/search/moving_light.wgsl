@@ -39,8 +39,9 @@ fn is_light_moving(at: vec2f) -> bool {
 /// much of the pixel.
 fn moving_light(color: vec4f, coverage: f32, at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     if layer == 0u {
-        var added = coverage * light_during(at, t, duration).rgb;
-        if RESTING { added = select(vec3f(0.0), (color.rgb + coverage * DARK) * light_during(at, t, duration).rgb, rests_at(at)); }
+        let light = light_during(at, t, duration).rgb;
+        var added = coverage * light;
+        if RESTING { added = share_of(color, coverage, light, at); }
         return vec4f(added, 0.0);
     }
     let f = layer / 2u;
@@ -53,12 +54,15 @@ fn moving_light(color: vec4f, coverage: f32, at: vec2f, layer: u32, t: f32, dura
     let node = light_nodes.count + select(0u, 1u, offset > 0.0);
     let there = textureSampleLevel(added_light, linear, light_uv(here), node, 0.0);
     let same = layer % 2u == 0u && layer < 2u * sources.count && is_inside(here) && dot(back, back) < SAME_SURFACE * SAME_SURFACE;
-    var change = coverage * (light_during(here, t, duration).rgb - there.rgb);
-    if RESTING {
-        let share = (1.0 + light_during(here, t, duration).rgb) / (1.0 + there.rgb) - 1.0;
-        change = select(vec3f(0.0), (color.rgb + coverage * DARK) * share, rests_at(here));
-    }
+    let light = light_during(here, t, duration).rgb;
+    var change = coverage * (light - there.rgb);
+    if RESTING { change = share_of(color, coverage, (1.0 + light) / (1.0 + there.rgb) - 1.0, here); }
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
+}
+
+/// A share of a colour that covers this much of the pixel, if what this frame shows at a place [px] rests.
+fn share_of(color: vec4f, coverage: f32, share: vec3f, at: vec2f) -> vec3f {
+    return select(vec3f(0.0), (color.rgb + coverage * DARK) * share, rests_at(at));
 }
 
 /// True if what this frame shows at a place [px] rests.

@@ -18,8 +18,8 @@
 @group(1) @binding(13) var motion: texture_2d<f32>;         // stored as given: to_prev, to_next [px]
 @group(1) @binding(14) var bodies_out: Flow;                // of cells of CELL x CELL pixels, relative to the surface: to_prev, to_next [px]; 0 where there is none
 @group(1) @binding(15) var others: texture_2d<f32>;         // stored as rgba16float, by `find_bodies`
-@group(1) @binding(17) var values_other: texture_2d<f32>;    // stored as rgba16float: of the other neighbour; 1 x 1: there is none
 @group(1) @binding(16) var others_out: Flow;                // as `bodies_out`: of bodies that move otherwise
+@group(1) @binding(17) var values_other: texture_2d<f32>;    // stored as rgba16float: of the other neighbour; 1 x 1: there is none
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
