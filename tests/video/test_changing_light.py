@@ -78,10 +78,10 @@ def toward(here, other, x, y, way):
     found = np.array([between(other, to[0] + dx, to[1] + dy) for dx, dy in around])
     a, b = own.mean(1), found.mean(1)
     shared = max(np.mean(a * b) - a.mean() * b.mean(), 0)
-    unlike = max(a.var() - shared**2 / max(b.var(), 255.0**-2), 0)
+    unlike = 1 - shared**2 / ((a.var() + 1.5e-5) * (b.var() + 1.5e-5))
     far = np.abs((found - own).mean(0)).mean()
     near = np.exp(-((far / 0.1) ** 2))
-    same = max(np.exp(-unlike / 0.0314**2 - (far / 0.235) ** 2), near)
+    same = max(np.exp(-((unlike / 0.5) ** 4)), near)
     is_no_noise = 1 - np.exp(-((far / 0.0157) ** 2))
     return is_no_noise * (between(other, *to) ** 2 - here[y, x] ** 2), same, near
 
@@ -161,6 +161,17 @@ def test_a_fade_is_even(device):
     pictures.pop(0)
     one = changed(device, pictures, motion, (0.0625, 0.0625))
     assert (one.mean() - pictures[1].mean()) > 0.003  # from the next picture alone
+
+
+def test_what_glare_covers_fades(device):
+    """The same waves behind much more light, about 70 levels of 255 apart."""
+    motion = np.zeros((HEIGHT, WIDTH, 4), np.float32)
+    here, other = 0.02 + texture(1) / 2, 0.3 + texture(1) / 2
+    apart = np.abs(np.sqrt(other) - np.sqrt(here)).mean()
+    assert 60 / 255 < apart < 80 / 255
+    got = changed(device, {0: other, 1: here, 2: here}, motion, (0.0625, 0.0625))
+    fade = 0.0625 * (other - here)
+    assert ((got - here) * fade).sum() / (fade * fade).sum() > 0.9
 
 
 def test_what_is_unlike_but_little_apart_fades(device):

@@ -34,11 +34,10 @@ const PREVIOUS: u32 = 0u;
 const NEXT: u32 = 1u;
 const SIDE: i32 = 5;            // of a patch [small px]
 const RADIUS: i32 = 2;
-const UNLIKE: f32 = 0.0314;     // deviation that another brightness and contrast do not explain: something else
-const FAR: f32 = 0.235;         // mean difference of something else,
-const NEAR: f32 = 0.1;          // of what may as well be something else, as a fade does little harm,
+const UNLIKE: f32 = 0.5;        // share of the variance that another brightness and contrast do not explain: something else
+const LEAST: f32 = 1.5e-5;      // variance of nothing
+const NEAR: f32 = 0.1;          // mean difference of what may as well be something else, as a fade does little harm,
 const NOISE: f32 = 0.0157;      // and of nothing
-const LEAST: f32 = 1.5e-5;      // variance
 const STILL: f32 = 1.0;         // px of motion, standard deviation of what stands,
 const JITTER: f32 = 3.0;        // and of motion there and back
 
@@ -111,9 +110,9 @@ fn toward(other: u32, px: vec2i, way: vec2f) -> End {
     let means = totals / count;
     let spread = squares / count - means.xyx * means.xyy;
     let both = max(spread.z, 0.0);
-    let unlike = max(spread.x - both * both / max(spread.y, LEAST), 0.0);
+    let unlike = (1.0 - both * both / ((spread.x + LEAST) * (spread.y + LEAST))) / UNLIKE;
     let far = dot(abs(apart), vec3f(1.0 / 3.0)) / count;
-    let lit = exp(-unlike / (UNLIKE * UNLIKE) - far * far / (FAR * FAR));
+    let lit = exp(-unlike * unlike * unlike * unlike);
     let near = exp(-far * far / (NEAR * NEAR));
     let own = textureLoad(here, px, 0).rgb;
     let found = between(other, to);
