@@ -417,7 +417,7 @@ def test_flow_on_what_rests_has_to_explain_more(device):
         )
         assert np.mean(np.abs(want - found[side])[near[::2, ::2]] > 5e-3) < 0.03
         best = twin.chosen(flows[side], flows[-side], still, found[side], found[-side], True)
-        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
+        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen, True)
         differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
         assert np.mean(differs > 5e-2) < 0.02
 
@@ -570,11 +570,8 @@ def test_a_bright_reflection_is_no_shadow():
                      depth=np.full((90, 140), 7, "f4"))  # fmt: skip
 
     frame = lit(0).between(lit(-1), lit(1))
-    want = np.mean([lit(t).color for t in Shutter(180).sample_times(64).astype(float)], 0)
-    off, auto, frames = (
-        error(Blur("gather", shading=s)(frame), want) for s in ("off", "auto", "frames")
-    )
-    assert auto < 1.01 * off < frames
+    off, auto, frames = (Blur("gather", shading=s)(frame) for s in ("off", "auto", "frames"))
+    assert error(auto, off) < 0.05 * error(frames, off)
 
 
 def test_colours_alone_tell_of_shadows():

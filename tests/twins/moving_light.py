@@ -505,7 +505,7 @@ def chosen(flow, flow_other, body, around, around_other, resting=False):
     return np.where(better[..., None], np.dstack([body, minus, explains]), best)
 
 
-def settled(found, own, other, depth, seen):
+def settled(found, own, other, depth, seen, resting=False):
     """The same, with flow that is not searched in the place of what explains nothing around it.
 
     Where it leads has to look as what is there. How much it explains is less than 0 there.
@@ -525,10 +525,12 @@ def settled(found, own, other, depth, seen):
     flow = way * (1 - keep)
     flow = flow + found[..., :2] * keep
     trust = 1 - keep[..., 0] + trusted * keep[..., 0]
-    filled = np.dstack([flow, trust, np.maximum(explains, fits * np.minimum(share / 0.05, 1))])
+    around = np.maximum(explains, fits * np.minimum(share / 0.05, 1)) if resting else explains
+    filled = np.dstack([flow, trust, around])
     own = np.dstack([found[..., :2], trusted, explains])
-    result = np.where(share[..., None] > 0.01, filled, own)
-    result[..., 3] *= np.where((found[..., 2] >= 0) & (share <= 0.05), 1, -1)
+    known = share > 0.01
+    result = np.where(known[..., None], filled, own)
+    result[..., 3] *= np.where((found[..., 2] >= 0) & ~known, 1, -1)
     return result
 
 
@@ -561,15 +563,13 @@ def from_pushed(a, b, own, other, trusts, explains, time, resting=False):
     """The change of the logarithm of light, from what came from here (a) and from there (b).
 
     `explains`: how much the flow explains, less than 0 where it is not searched: there what covers
-    a part of a pixel is spread over up to twice this part; over four times where surfaces rest.
+    a part of a pixel is spread over up to four times this part, and where surfaces rest.
 
     Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
     """
     amounts = own[..., 3], other[..., 3]
     own, other = own[..., :3], other[..., :3]
-    most = np.where(explains < 0, 2, 1)[..., None]
-    if resting:
-        most = 4
+    most = np.where(resting | (explains < 0), 4, 1)[..., None]
     a, b = (one * np.clip(1 / np.maximum(one[..., 3:], 0.01), 1, most) for one in (a, b))
     explains = np.abs(explains)
     late = smooth(time, 0.3)

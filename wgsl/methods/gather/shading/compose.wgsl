@@ -32,8 +32,7 @@ override TOLD: bool = true;         // how sure it is
 override RESTING: bool = false;     // the light is the picture itself, on what rests: written is the share of the colour that is added
 
 const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
-const MOST_CLOSED: f32 = 2.0;       // factor of what covers a part of a pixel where flow is not searched,
-const MOST_CLOSED_RESTING: f32 = 4.0;   // and of what is seen in colours that rest
+const MOST_CLOSED: f32 = 4.0;       // factor of what covers a part of a pixel where flow is not searched, or seen in colours that rest
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
 const DARKEST: f32 = -3.0;       // change of the logarithm of light where a neighbour does not show it
 const MOST_ADDED: f32 = 60000.0;    // [linear]
@@ -179,7 +178,7 @@ fn store(px: vec2i, change: vec3f, a: f32) {
 fn pushed(px: vec2i) -> vec4f {
     let first = 2u * (u32(px.y) * frame.size.x + u32(px.x));
     let explains = textureLoad(flow, px, 0).w;
-    let most = select(select(1.0, MOST_CLOSED, explains < 0.0), MOST_CLOSED_RESTING, RESTING);
+    let most = select(1.0, MOST_CLOSED, RESTING || explains < 0.0);
     let a = closed(unpack_pushed(from_here[first], from_here[first + 1u]), most);
     let b = closed(unpack_pushed(from_there[first], from_there[first + 1u]), most);
     for (var k = 0u; k < 2u; k++) {     // empty for the next time

@@ -35,8 +35,8 @@ override MISSED: f32 = select(0.85, 0.45, RESTING); // share of the differences 
 override EXPLAINED: f32 = select(0.6, 0.2, RESTING);    // and up to which it explains them
 
 const CLEARLY: f32 = 0.75;      // share of other differences from which on less is clearly less
-const ENOUGH: f32 = 0.05;       // weight around from which on flow is known there
-const SOME: f32 = 0.01;         // the same from which on it is told at all
+const SOME: f32 = 0.01;         // weight around from which on flow is known there,
+const ENOUGH: f32 = 0.05;       // and from which on it explains colours that rest as far as it fits
 const UNLIKE: f32 = 0.3;        // difference of values from which on flow around does not fit
 const ALONE_COUNTS: f32 = 4.0;  // how much of a difference it is that this frame alone is bright
 const CELL: u32 = 4u;           // side [px]
@@ -298,9 +298,10 @@ fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     let differs = abs(values_there_at(to).a - textureLoad(values, id, 0).a);
     let fits = select(1.0, 1.0 - min(differs / UNLIKE, 1.0), is_there);
     let keep = select(max(own.z * own.w, 1.0 - fits), 0.0, chosen.z < 0.0);     // a body's is smooth
-    let explains = max(own.w, fits * min(near.z / ENOUGH, 1.0));
+    let explains = select(own.w, max(own.w, fits * min(near.z / ENOUGH, 1.0)), RESTING);
     let filled = vec4f(mix(way, own.xy, keep), mix(1.0, own.z, keep), explains);
-    let result = select(own, filled, near.z > SOME);
-    let is_searched = chosen.z >= 0.0 && near.z <= ENOUGH;
+    let is_known = near.z > SOME;
+    let result = select(own, filled, is_known);
+    let is_searched = chosen.z >= 0.0 && !is_known;
     textureStore(flow_out, id, vec4f(result.xyz, select(-result.w, result.w, is_searched)));
 }
