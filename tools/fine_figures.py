@@ -25,6 +25,7 @@ ABOUT = {
     "bricks.",
     "foliage": "Leaves of 2 to 8 px flutter before a wall of bricks.",
     "beginner": "A ball and a cube pass over a floor, under a sun.",
+    "wires": "Wires, about as thick as a pixel, slide before a wall of bricks.",
     "soft_disk": "A disk out of focus, with a rim of 10 px, before a detailed wall. Vectors are "
     "averaged over the lens, depth is one sample's.",
 }
@@ -32,6 +33,7 @@ CROPS = {  # corner and size [px] of what is shown
     "shaken": ((40, 20), (80, 50)),
     "foliage": ((30, 20), (80, 50)),
     "beginner": ((22, 20), (80, 50)),
+    "wires": ((40, 20), (80, 50)),
     "soft_disk": ((40, 20), (80, 50)),
 }
 

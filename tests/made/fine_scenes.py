@@ -72,7 +72,17 @@ def beginner():
     return Scene("beginner", (_floor(), *bodies), shot)
 
 
-SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner)}
+def wires():
+    """Wires about as thick as a pixel slide before a detailed wall; a camera rolled a little."""
+    wires = [
+        Body("box", (0.012, 1.5, 0.012), moving((x, 1.4, 0), (2.5, 0, 0)), (0.9, 0.9, 0.9))
+        for x in np.arange(-3, 3, 0.4)
+    ]
+    shot = CameraPath(lambda t: (0 * t, 1.4, 2.6), roll=lambda t: 0.13 + 0 * t)
+    return Scene("wires", (*_room(), *wires), shot)
+
+
+SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner, wires)}
 
 
 def soft_disk(t, size=(90, 160), speed=18.0, soft=10.0):

@@ -34,7 +34,7 @@ def test_gather_is_its_twin_where_surfaces_hardly_move_apart():
     sources = [(offset, *crossing((24, 40), offset, wall=False)) for offset in (0, -1, 1)]
     none, thin, every = (
         (gather_twin.separate(*sources[0], longest).depth[1] > 0).sum()
-        for longest in (0.04, 0.14, 0.5)
+        for longest in (0.02, 0.14, 0.5)
     )
     assert 0 == none < thin < every
     assert differing_from_gather(sources, 100) < 0.01

@@ -120,7 +120,7 @@ def separate(offset, color, motion, depth, longest, prev=None, next=None, far=()
             shows_third[y, x] = edges[y, x] and any(
                 min(depths) * k < d < max(depths) / k for d in depths
             )
-            slow[y, x] = apart * longest < (8 if edges[y, x] and is_wide(z, (y, x), near) else 1)
+            slow[y, x] = apart * longest < (8 if edges[y, x] and is_wide(z, (y, x), near) else 0.5)
             fast[y, x] = edges[y, x] and apart > 2
             mixed[y, x] = fast[y, x] and is_mixed(motion, z, (y, x), near)
     told_by_color = unfiltered(fast, mixed)
