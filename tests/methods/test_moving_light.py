@@ -564,7 +564,7 @@ def test_a_bright_reflection_is_no_shadow():
     x, _ = twin.centres((90, 140))
 
     def lit(t):
-        bar = np.exp(-0.5 * ((x - 70 - 14 * t) / 3) ** 2)[..., None]
+        bar = np.exp(-0.5 * ((x - 70 - 14 * t) / 5) ** 2)[..., None]
         color = 0.3 + 0.2 * np.sin(x)[..., None] * np.ones(3) + 0.4 * bar
         return Frame(color=color.astype("f4"), motion=np.zeros((90, 140, 4), "f4"),
                      depth=np.full((90, 140), 7, "f4"))  # fmt: skip

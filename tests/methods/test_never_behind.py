@@ -21,7 +21,7 @@ BUILT_IN = {
     "fence": {"speed": 6},
     "hdr": {"speed": 3},
 }
-BEHIND = {("wires", 180)}  # in FLIP, 0.0167: reproject 0.0156
+BEHIND = {("wires", 180): 1.08}  # FLIP of `gather`, 0.0167, to that of `reproject`, 0.0156
 
 
 def scene_of(name):
@@ -45,7 +45,7 @@ def assert_not_behind(name, degrees):
     psnr, flip = score(name, "gather", degrees, want)
     simpler = [score(name, method, degrees, want) for method in SIMPLER]
     assert psnr > max(p for p, _ in simpler) - DECIBELS
-    assert flip < min(f for _, f in simpler) * SHARE
+    assert flip < min(f for _, f in simpler) * BEHIND.get((name, degrees), SHARE)
 
 
 @pytest.mark.covers(0)
@@ -57,15 +57,8 @@ def test_gather_is_not_behind_a_simpler_method(name, degrees):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    ("name", "degrees"),
-    [
-        (name, degrees)
-        for name in (*BUILT_IN, *fine_scenes.NAMES)
-        for degrees in (90, 180, 360)
-        if (name, degrees) not in BEHIND
-    ],
-)
+@pytest.mark.parametrize("degrees", [90, 180, 360])
+@pytest.mark.parametrize("name", [*BUILT_IN, *fine_scenes.NAMES])
 def test_gather_is_behind_nowhere(name, degrees):
     assert_not_behind(name, degrees)
 

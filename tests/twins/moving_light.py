@@ -525,8 +525,8 @@ def settled(found, own, other, depth, seen, resting=False):
     flow = way * (1 - keep)
     flow = flow + found[..., :2] * keep
     trust = 1 - keep[..., 0] + trusted * keep[..., 0]
-    around = np.maximum(explains, fits * np.minimum(share / 0.05, 1)) if resting else explains
-    filled = np.dstack([flow, trust, around])
+    told = np.maximum(explains, fits * np.minimum(share / 0.05, 1)) if resting else explains
+    filled = np.dstack([flow, trust, told])
     own = np.dstack([found[..., :2], trusted, explains])
     known = share > 0.01
     result = np.where(known[..., None], filled, own)
@@ -562,8 +562,8 @@ def smooth(x, half):
 def from_pushed(a, b, own, other, trusts, explains, time, resting=False):
     """The change of the logarithm of light, from what came from here (a) and from there (b).
 
-    `explains`: how much the flow explains, less than 0 where it is not searched: there what covers
-    a part of a pixel is spread over up to four times this part, and where surfaces rest.
+    `explains`: how much the flow explains, less than 0 where it is not searched: there, and where
+    surfaces rest, what covers a part of a pixel is spread over up to four times this part.
 
     Beside it, the share of the darkness of both frames (own, other: with how much) that is trusted.
     """

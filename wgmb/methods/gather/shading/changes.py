@@ -22,28 +22,23 @@ class SurfaceLight:
     motion: View
 
 
-def screen(stage: Stage, frames: Mapping[int, SurfaceLight]) -> None:
-    """Record in which tiles light may differ in a neighbour; `frames` as those of `changes`."""
+def screen(stage: Stage, frames: Mapping[int, SurfaceLight], scale: int) -> None:
+    """Record in which tiles light may differ in a neighbour; `frames` as those of `changes`.
+
+    Of what rests, a pixel of the `stage` is `scale` pixels of the frames wide.
+    """
     for offset, other in frames.items():
-        if offset:
-            stage.run("changes/screen", **_both(stage, frames[0], other, offset))
-
-
-def at_rest(stage: Stage, frames: Mapping[int, SurfaceLight], scale: int) -> None:
-    """The same of surfaces that rest; a pixel of the `stage` is `scale` pixels wide."""
-    here = frames[0]
-    for offset, there in frames.items():
-        if offset:
+        if not offset:
+            continue
+        if stage.resting:
             stage.run(
                 "changes/still",
                 constants={"SCALE": scale},
-                light_here=here.light,
-                light_there=there.light,
-                depth_here=here.depth,
-                depth_there=there.depth,
-                motion_here=here.motion,
-                motion_there=there.motion,
+                motion_there=other.motion,
+                **_pair(frames[0], other),
             )
+        else:
+            stage.run("changes/screen", **_both(stage, frames[0], other, offset))
 
 
 def reduced(
@@ -74,8 +69,11 @@ def reduced(
 
 def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
     """Bindings of passes that compare the frame with the neighbour at `offset`."""
+    return {"side": stage.uniform("changes/both", "Side", next=offset > 0), **_pair(own, other)}
+
+
+def _pair(own: SurfaceLight, other: SurfaceLight) -> dict[str, Any]:
     return {
-        "side": stage.uniform("changes/both", "Side", next=offset > 0),
         "light_here": own.light,
         "light_there": other.light,
         "depth_here": own.depth,

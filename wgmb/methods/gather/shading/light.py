@@ -13,7 +13,7 @@ import wgpu
 from .... import gpu
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer, TexturePool
-from .changes import SurfaceLight, View, at_rest, changes, reduced, screen
+from .changes import SurfaceLight, View, changes, reduced, screen
 from .flow import (
     LightFlow,
     flows,
@@ -133,10 +133,7 @@ class MovingLight:
         ]
         grid = _tile_grid(stage.size)
         for stage, kind in zip(stages, kinds, strict=True):
-            if resting:
-                at_rest(stage, kind.frames, scale)
-            else:
-                screen(stage, kind.frames)
+            screen(stage, kind.frames, scale)
         stage.run("near", "list_doubtful", size=grid, **lists)
         stage.run("near", "size_doubtful", size=(1, 1), **lists)
         if resting:

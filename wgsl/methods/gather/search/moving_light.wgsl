@@ -19,7 +19,6 @@ struct LightNodes {
 @group(1) @binding(14) var<storage, read> light_changes: array<u32>;    // one word, then those of tiles: see active.wgsl
 
 override MOVING_LIGHT: bool = false;    // whether there is any
-override RESTING: bool = false;     // it is told of surfaces that rest, as a share of their colour
 
 const SAME_SURFACE: f32 = 1.0;  // a way there and back ends no farther than this from where it began [px]
 

@@ -29,7 +29,6 @@ override HAS_ALBEDO: bool = true;   // else it is 1
 override WEIGHTED: bool = false;    // multiply by `weight`
 override ONTO: bool = false;        // add to `earlier`
 override TOLD: bool = true;         // how sure it is
-override RESTING: bool = false;     // the light is the picture itself, on what rests: written is the share of the colour that is added
 
 const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
 const MOST_CLOSED: f32 = 4.0;       // factor of what covers a part of a pixel where flow is not searched, or seen in colours that rest
@@ -159,7 +158,7 @@ fn add_nothing(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
 }
 
 fn store(px: vec2i, change: vec3f, a: f32) {
-    if RESTING {
+    if RESTING {    // a share of the colour
         textureStore(added, px, vec4f(exp(change) - 1.0, a));
         return;
     }

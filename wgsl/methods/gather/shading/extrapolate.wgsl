@@ -26,11 +26,11 @@ alias Weighted = texture_storage_2d<rgba32float, write>;
 
 override NEXT: bool = false;    // the neighbour is the next frame
 override COLORS: bool = false;  // the light is the picture itself: its differences may be texture, so that a guess has to explain more
-override RESTING: bool = false; // the same on what rests, unasked: flow has to explain nearly all
 override SURE: f32 = select(0.5, 0.75, COLORS);             // how much the motion of a body has to explain
 override BODY_CLEARLY: f32 = select(0.83, 0.75, COLORS);    // as CLEARLY, of a body
 override HIDDEN: f32 = select(0.3, 1.0, COLORS);    // share of what differs without motion that counts where a body hides what it is compared with
 
+// Of what rests, unasked, flow has to explain nearly all.
 override MISSED: f32 = select(0.85, 0.45, RESTING); // share of the differences without flow from which on it explains nothing,
 override EXPLAINED: f32 = select(0.6, 0.2, RESTING);    // and up to which it explains them
 

@@ -14,8 +14,9 @@
 fn list_doubtful(@builtin(global_invocation_id) id: vec3u) {
     let tiles = light_tiles();
     if any(id.xy >= tiles) { return; }
-    whole.tiles[id.y * tiles.x + id.x] = id.y * tiles.x + id.x;
-    if tiles_to(vec2i(id.xy), MAY_CHANGE, 1) <= 1 { doubtful.tiles[atomicAdd(&doubtful.count, 1u)] = id.y * tiles.x + id.x; }
+    let tile = id.y * tiles.x + id.x;
+    whole.tiles[tile] = tile;
+    if tiles_to(vec2i(id.xy), MAY_CHANGE, 1) <= 1 { doubtful.tiles[atomicAdd(&doubtful.count, 1u)] = tile; }
 }
 
 @compute @workgroup_size(1)
@@ -23,8 +24,9 @@ fn size_doubtful() {
     let tiles = light_tiles();
     let count = atomicLoad(&doubtful.count);
     doubtful.groups = groups_for(TILE_GROUPS * count);
-    atomicStore(&whole.count, select(0u, tiles.x * tiles.y, count > 0u));
-    whole.groups = groups_for(TILE_GROUPS * atomicLoad(&whole.count));
+    let all_tiles = select(0u, tiles.x * tiles.y, count > 0u);
+    atomicStore(&whole.count, all_tiles);
+    whole.groups = groups_for(TILE_GROUPS * all_tiles);
 }
 
 /// After `limit_ratio`: an invocation is a tile.

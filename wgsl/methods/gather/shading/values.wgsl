@@ -13,8 +13,6 @@
 
 alias Values = texture_storage_2d<rgba16float, write>;
 
-override RESTING: bool = false; // the light is the picture itself, on what rests: what is brighter around is another texture
-
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -32,7 +30,9 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         return;
     }
     var brightest = most;
-    if !RESTING { brightest = max(most, textureLoad(closed, px, 0).rgb - level); }
+    if !RESTING {   // there, what is brighter around is another texture
+        brightest = max(most, textureLoad(closed, px, 0).rgb - level);
+    }
     let darkness = 1.0 - exp(change - brightest);
     textureStore(values, px, vec4f(darkness, max(dot(darkness, LUMINANCE), 0.0)));
 }

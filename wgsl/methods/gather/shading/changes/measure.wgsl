@@ -11,8 +11,6 @@
 @group(1) @binding(8) var plain_there: texture_2d<u32>;     // stored as r32uint
 @group(1) @binding(9) var ratio: Ratio;     // of light, as a logarithm; a: 1 where the surface is seen there
 
-override RESTING: bool = false;     // only what rests is compared
-
 alias Ratio = texture_storage_2d<rgba16float, write>;
 
 const LEADS_BACK: f32 = 1.0;    // a vector that leads farther away from where it came from [px] is of something else
