@@ -56,7 +56,7 @@ class Kernel:
         self.bindings = {b.name: b for b in source.bindings()}
         self.workgroup = int(source.constant("WG_X")), int(source.constant("WG_Y"))
         try:
-            module = device.create_shader_module(code=source.text, label=source.name)
+            self._module = _module(device, source.name, source.text)
         except wgpu.GPUError as error:
             raise ShaderError(_located(str(error), source)) from None
         self._names = {b.name for b in self.bindings.values() if b.group > 0}
@@ -70,20 +70,29 @@ class Kernel:
             )
             for group in self.groups
         ]
-        layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
-        self.pipelines = {
-            name: device.create_compute_pipeline(
-                label=f"{source.name}:{name}",
-                layout=layout,
-                compute={"module": module, "entry_point": name, "constants": constants or {}},
-            )
-            for name in source.entry_points()
-        }
-        self._labels = {name: f"{source.name}:{name}" for name in self.pipelines}
+        self._layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
+        self._pipelines: dict[str, wgpu.GPUComputePipeline] = {}
         self._places = [
             {b.name: b.index for b in self.bindings.values() if b.group == group}
             for group in self.groups
         ]
+
+    def pipeline(self, entry: str) -> wgpu.GPUComputePipeline:
+        """The compiled pass of an entry point, made when it is first asked for.
+
+        On lavapipe, each takes 1 MB and 10 ms.
+        """
+        if entry not in self._pipelines:
+            self._pipelines[entry] = self.device.create_compute_pipeline(
+                label=f"{self.source.name}:{entry}",
+                layout=self._layout,
+                compute={
+                    "module": self._module,
+                    "entry_point": entry,
+                    "constants": self.constants,
+                },
+            )
+        return self._pipelines[entry]
 
     def bands(self, bindings: FrameBindings, most: int) -> Iterator[tuple[int, FrameBindings]]:
         """The image as bands of whole rows, of about `most` pixels each.
@@ -114,8 +123,9 @@ class Kernel:
             raise ShaderError(f"{self.source.name} binds {wanted}, got {got}")
         every = bindings.resources | resources
         make = made_group if bindings.groups is None else bindings.groups.group
-        compute = encoder.begin_compute_pass(label=self._labels[entry])
-        compute.set_pipeline(self.pipelines[entry])
+        pipeline = self.pipeline(entry)
+        compute = encoder.begin_compute_pass(label=pipeline.label)
+        compute.set_pipeline(pipeline)
         for group, layout in zip(self.groups, self.layouts, strict=True):
             bound = {index: every[name] for name, index in self._places[group].items()}
             compute.set_bind_group(group, make(self.device, layout, bound))
@@ -126,6 +136,11 @@ class Kernel:
                 *(-(-n // edge) for n, edge in zip(bindings.size, self.workgroup, strict=True))
             )
         compute.end()
+
+
+@lru_cache(maxsize=128)
+def _module(device: wgpu.GPUDevice, name: str, text: str) -> wgpu.GPUShaderModule:
+    return device.create_shader_module(code=text, label=name)
 
 
 @lru_cache(maxsize=256)
@@ -167,6 +182,7 @@ def stored(view: wgpu.GPUTextureView) -> str:
 def forget_kernels() -> None:
     """Let go of all compiled kernels, and of constants: their device is lost."""
     _kernel.cache_clear()
+    _module.cache_clear()
     forget_constants()
 
 

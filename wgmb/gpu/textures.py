@@ -9,10 +9,11 @@ import numpy as np
 import wgpu
 
 from ..errors import InputError
-from .device import check_size, submit
+from .device import SOFTWARE, check_size, submit
 
 _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
-_READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture
+_READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture,
+_READBACK_IN_SOFTWARE = 4 << 20  # where as much at a time is as quick
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}
@@ -28,13 +29,13 @@ def numpy_of(format: str) -> tuple[np.dtype, int]:
 
 
 def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -> None:
-    """Put an array (height, width[, channels]) of the texture's own type into its first corner."""
-    image = np.ascontiguousarray(image)
+    """Put an array (height, width[, channels]) into the texture's first corner, as its type."""
+    kind, channels = numpy_of(texture.format)
     height, width = image.shape[:2]
-    row = image.strides[0]
+    row = width * channels * kind.itemsize
     band = max(1, _BAND // row)
     for top in range(0, height, band):
-        rows = image[top : top + band]
+        rows = _of_kind(image[top : top + band], kind)
         device.queue.write_texture(
             {"texture": texture, "origin": (0, top, 0)},
             rows,
@@ -42,6 +43,14 @@ def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -
             (width, len(rows), 1),
         )
         submit(device)  # what is written is held in memory until a submit
+
+
+def _of_kind(rows: np.ndarray, kind: np.dtype) -> np.ndarray:
+    """Rows of an image in one piece, as another type; only infinity becomes infinite halves."""
+    if kind == np.float16 and rows.dtype != np.float16:
+        rows = np.where(np.isinf(rows), rows, np.clip(rows, -_HALF_MAX, _HALF_MAX))
+    with np.errstate(over="ignore"):  # what f32 cannot hold is infinite, and counted as bad
+        return np.ascontiguousarray(rows, kind)
 
 
 class ScratchBuffer:
@@ -76,6 +85,8 @@ class TexturePool:
         self._textures: dict[str, wgpu.GPUTexture] = {}
         self._views: dict[str, dict[tuple, wgpu.GPUTextureView]] = {}  # by the texture's name
         self._staging: wgpu.GPUBuffer | None = None
+        in_software = device.adapter_info["adapter_type"] == SOFTWARE
+        self._at_once = _READBACK_IN_SOFTWARE if in_software else _READBACK
 
     def texture(
         self, name: str, size: tuple[int, int], format: str, layers: int = 1
@@ -112,11 +123,6 @@ class TexturePool:
     def upload(self, name: str, image: np.ndarray, format: str) -> wgpu.GPUTextureView:
         """Put `image` (height, width[, channels]) into the texture called `name`."""
         height, width = image.shape[:2]
-        kind, _ = numpy_of(format)
-        if kind == np.float16 and image.dtype != np.float16:
-            image = np.where(np.isinf(image), image, np.clip(image, -_HALF_MAX, _HALF_MAX))
-        with np.errstate(over="ignore"):  # what f32 cannot hold is infinite, and counted as bad
-            image = np.ascontiguousarray(image, kind)
         texture = self.texture(name, (width, height), format)
         write(self.device, texture, image)
         return self.view_of(texture)
@@ -128,7 +134,7 @@ class TexturePool:
         row = width * channels * kind.itemsize
         pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
         picture = np.empty((height, width, channels), kind)
-        band = max(1, min(height, _READBACK // pitch))
+        band = max(1, min(height, self._at_once // pitch))
         if self._staging is None or self._staging.size != pitch * band:
             usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
             self._staging = self.device.create_buffer(

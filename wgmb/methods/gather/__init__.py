@@ -87,7 +87,7 @@ class Gather:
             self.uses = frozenset({"neighbours"})
         self._light = MovingLight(device, confidence=confidence)
         self._tiles = ActiveTiles(device)
-        self._layers = Layers(device, images)
+        self._layers = Layers(device, images, 2 * options.reach + 1)
         self._motions, self._scatter = TileMotions(device, images), Scatter(device)
         self._search = Search(device, images, confidence=confidence, output=output)
 

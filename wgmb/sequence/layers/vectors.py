@@ -198,7 +198,7 @@ def channels_of(
 def read(
     channels: Mapping[str, np.ndarray], vectors: Vectors, near: str | None = None
 ) -> np.ndarray:
-    """(height, width, 4) float32: to_prev and to_next [px] of a frame's channels.
+    """(height, width, 4) float32: to_prev and to_next [px] of a frame's channels, plane by plane.
 
     Where one side is not there it is the other's opposite: a straight path. Where the vectors'
     mask is not 1 they are not valid, and the motion is 0; where it is between 0 and 1, at the
@@ -211,7 +211,7 @@ def read(
     signs = {"prev": convention.prev_sign, "next": convention.next_sign}
 
     first = channels[next(iter(sides.values()))[0]]
-    motion = np.empty((*first.shape, 4), np.float32)
+    motion = np.moveaxis(np.empty((4, *first.shape), np.float32), 0, 2)
     for side, (begin, other) in (("prev", (0, 2)), ("next", (2, 0))):
         if side not in sides:
             continue

@@ -13,16 +13,19 @@ from .relight import Relight
 
 
 class Layers:
-    """The layers of up to three frames, each in a slot: its index among the inputs.
+    """The layers of up to `most` frames, each in a slot: its index among the inputs.
 
-    `textures`: "layer_colors" and "surfaces" have two layers per slot, "mattes" has one.
+    `textures`: "layer_colors" and "surfaces" have two layers per slot, "mattes" has one. They have
+    a slot for all `most` frames once one has a neighbour, as a texture that grows leaves its memory
+    unused.
     """
 
-    def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
+    def __init__(self, device: wgpu.GPUDevice, images: TexturePool, most: int):
         self._device, self._images = device, images
         self._edges, self._edge_pixels = Edges(device, images), ScratchBuffer(device)
         self._edge_groups, self._unused = ScratchBuffer(device), ScratchBuffer(device)
         self._relight = Relight(device)
+        self._most, self._slots = most, 1
         self.textures: dict[str, wgpu.GPUTexture] = {}
 
     def front_surface(self, slot: int) -> wgpu.GPUTextureView:
@@ -65,7 +68,8 @@ class Layers:
 
     def encode(self, encoder, inputs, worklists: dict[str, dict]) -> None:
         """Record the layers of all frames, where something moves near."""
-        size, count = inputs.bindings.size, len(inputs.frames)
+        size = inputs.bindings.size
+        count = self._slots = self._most if len(inputs.frames) > 1 else self._slots
         color = inputs.frame.color.texture.format
         if color not in ("rgba16float", "rgba32float"):
             color = gpu.texel(self._device, 4)
@@ -99,7 +103,7 @@ class Layers:
         }
         read = {name: getattr(frame, name) for name in ("color", "motion", "depth")}
         others = {
-            f"{side}_{name}": getattr(other, name, None) or inputs.unbound
+            f"{side}_{name}": getattr(other or frame, name) or inputs.unbound
             for side, other in neighbours.items()
             for name in ("color", "motion", "depth", "weight")
         }
@@ -110,13 +114,19 @@ class Layers:
             written | {name: gpu.stored(view) for name, view in (read | others).items()},
             WEIGHTED=frame.weight is not None,
             COPIED=copied,
-            HAS_PREV=neighbours["prev"] is not None,
-            HAS_NEXT=neighbours["next"] is not None,
-            OWN_IS_PREV=frame.offset == 1,
-            OWN_IS_NEXT=frame.offset == -1,
-            RELIT=not frame.offset,
-            HAS_FAR_PREV=not frame.offset and any(f.offset == -2 for f in inputs.frames),
-            HAS_FAR_NEXT=not frame.offset and any(f.offset == 2 for f in inputs.frames),
+        )
+        there = {other.offset for other in inputs.frames}
+        around = gpu.uniform(
+            self._device,
+            "methods/gather/layers/around.wgsl",
+            "Neighbours",
+            has_prev=neighbours["prev"] is not None,
+            has_next=neighbours["next"] is not None,
+            own_is_prev=frame.offset == 1,
+            own_is_next=frame.offset == -1,
+            relit=not frame.offset,
+            has_far_prev=not frame.offset and -2 in there,
+            has_far_next=not frame.offset and 2 in there,
         )
         pixels = self._edge_pixels.at_least(4 + 4 * size[0] * size[1])
         encoder.clear_buffer(pixels, 0, 4)
@@ -133,6 +143,7 @@ class Layers:
                 indirect,
                 worklist=worklist,
                 weight=frame.weight or inputs.unbound,
+                neighbours=around,
                 edges=pixels,
                 edge_groups=groups if sizing else self._unused.at_least(16),
                 **read,

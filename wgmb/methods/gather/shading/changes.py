@@ -69,7 +69,7 @@ def reduced(
 
 def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
     """Bindings of passes that compare the frame with the neighbour at `offset`."""
-    return {"side": stage.uniform("changes/both", "Side", next=offset > 0), **_pair(own, other)}
+    return {"side": stage.uniform("changes/side", "Side", next=offset > 0), **_pair(own, other)}
 
 
 def _pair(own: SurfaceLight, other: SurfaceLight) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from ....gpu import wgsl
 from .changes import View
 from .stage import FOLDER, Stage
 
+COARSE = 3  # first level whose patches are all searched, at all of their pixels
 COARSEST = 20  # px along the longer side of the coarsest level, at least
 SPREAD, GUARD = 5.0, 4.0  # [px] sigma of the fill, and of where motion has to explain the change
 
@@ -68,9 +69,8 @@ def pyramid(stage: Stage, name: str, source: View) -> list[Level]:
     for i, size in enumerate(level_sizes(stage.size)[1:], 1):
         names = (f"level {i} {kind}{name}" for kind in ("", "squares "))
         level = Level(*(stage.texture(name, format, size) for name in names))
-        stage.run("pyramid", "halve", size=size, constants={"LEVEL": i},
-                  source=levels[-1].gradients, level=level.gradients,
-                  squares=level.squares)  # fmt: skip
+        stage.run("pyramid", "halve", size=size, source=levels[-1].gradients,
+                  level=level.gradients, squares=level.squares)  # fmt: skip
         levels.append(level)
     return levels
 
@@ -126,9 +126,10 @@ def _extrapolated(
             "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
             "bodies": bodies, "others": none, "around": wide, "around_other": wide,
             "flow_out": spare, "bodies_out": spare, "others_out": spare,
-            "weighted": stage.unused("rgba32float"), **surfaces,
+            "weighted": stage.unused("rgba32float"),
+            "side": stage.uniform("changes/side", "Side", next=side > 0), **surfaces,
         }  # fmt: skip
-        constants: dict[str, float] = {"NEXT": side > 0, "COLORS": by_color}
+        constants: dict[str, float] = {"COLORS": by_color}
         stage.run("extrapolate", entry, over="near", constants=constants, **given | bindings)
 
     spare, one = stage.unused("rgba16float"), next(iter(searched))
@@ -239,6 +240,7 @@ def _search(stage: Stage, name: str, here: list[Level], other: list[Level]) -> V
         else:
             found = stage.texture(name_of_flow, "rgba16float", flow_size(sizes[i]))
         no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
+        coarse_or_not: dict[str, float] = {"IS_COARSE": i >= COARSE}
         passes = [("search", grid, stage.none("rgba32float"), first, no_flow)]
         if finest:  # from flow that was propagated on the coarser level
             passes += [("write_finest", None, first, no_patches, found)]
@@ -247,7 +249,7 @@ def _search(stage: Stage, name: str, here: list[Level], other: list[Level]) -> V
                        ("write_flow", flow_size(sizes[i]), second, no_patches, found)]  # fmt: skip
         for entry, size, patches, patches_out, flow_out in passes:
             stage.run(
-                "flow", entry, size=size, over=None if size else "near", constants={"LEVEL": i},
+                "flow", entry, size=size, over=None if size else "near", constants=coarse_or_not,
                 here=here[i].gradients, there=other[i].squares, coarse=coarse, patches=patches,
                 patches_out=patches_out, flow_out=flow_out,
             )  # fmt: skip

@@ -37,7 +37,8 @@ class Scatter:
         slice_size = 4 * blocks * len(_near(inputs))
         limit = self._device.limits["max-storage-buffer-binding-size"]
         size = slice_size * max(min(most, inputs.samples, limit // slice_size), 1)
-        scattered = {"buffer": self._scattered.at_least(size), "offset": 0, "size": size}
+        three = min(3 * size // len(_near(inputs)), limit) if len(_near(inputs)) > 1 else size
+        scattered = {"buffer": self._scattered.at_least(three), "offset": 0, "size": size}
         encoder.clear_buffer(scattered["buffer"], 0, size)
         return scattered
 

@@ -1,5 +1,5 @@
 // Information from the frames before and after a frame: paths of surfaces beyond them, and backgrounds that it hides.
-// Where there is no such frame its textures are empty, and not read.
+// Where there is no such frame its textures are not read.
 //#include common/depth.wgsl
 //#include common/accelerations.wgsl
 //#include common/frame.wgsl
@@ -19,14 +19,19 @@
 @group(1) @binding(22) var far_surfaces: texture_2d_array<u32>;
 @group(1) @binding(23) var far_mattes: texture_2d_array<u32>;
 
+@group(1) @binding(5) var<uniform> neighbours: Neighbours;  // no overrides: each frame of a sequence would have its own pipelines
+
+struct Neighbours {     // 1 or 0
+    has_prev: u32,      // there is a frame before, and one after
+    has_next: u32,
+    own_is_prev: u32,   // the one before is the frame that is blurred, or the one after is
+    own_is_next: u32,
+    relit: u32,         // they have gains
+    has_far_prev: u32,  // there is a frame beyond the one before, and beyond the one after
+    has_far_next: u32,
+}
+
 override WEIGHTED: bool = false;        // read weights
-override HAS_PREV: bool = true;         // there is a frame before, and one after
-override HAS_NEXT: bool = true;
-override OWN_IS_PREV: bool = false;     // the one before is the frame that is blurred, or the one after is
-override OWN_IS_NEXT: bool = false;
-override RELIT: bool = false;           // they have gains
-override HAS_FAR_PREV: bool = false;    // there is a frame beyond the one before, and beyond the one after
-override HAS_FAR_NEXT: bool = false;
 
 struct SurfaceAround {
     trajectory: Trajectory5,
@@ -37,9 +42,10 @@ struct SurfaceAround {
 fn surface_around(px: vec2i, motion: vec4f, z: f32) -> SurfaceAround {
     var before = Acceleration(vec2f(0.0), false, 1.0);
     var after = before;
-    if HAS_PREV { before = acceleration_in(px, motion.xy, z, false); }
-    if HAS_NEXT { after = acceleration_in(px, motion.zw, z, true); }
-    let depth_ratio = select(select(1.0, after.depth_ratio, OWN_IS_NEXT), before.depth_ratio, OWN_IS_PREV);
+    if neighbours.has_prev == 1u { before = acceleration_in(px, motion.xy, z, false); }
+    if neighbours.has_next == 1u { after = acceleration_in(px, motion.zw, z, true); }
+    let depth_ratio = select(
+        select(1.0, after.depth_ratio, neighbours.own_is_next == 1u), before.depth_ratio, neighbours.own_is_prev == 1u);
     return SurfaceAround(trajectory_between(motion, before, after), depth_ratio);
 }
 
@@ -54,11 +60,11 @@ const BACKGROUND_RETURNS: f32 = 1.0;        // [px], see RETURNS
 /// The background at the centre of `px`, of these vectors and this depth, as the frames around show it.
 fn background_around(px: vec2i, motion: vec4f, z: f32) -> Background {
     var sum = Background(vec4f(0.0), 0.0);
-    if HAS_PREV { look(&sum, px, motion.xy, z, false); }
-    if HAS_NEXT { look(&sum, px, motion.zw, z, true); }
+    if neighbours.has_prev == 1u { look(&sum, px, motion.xy, z, false); }
+    if neighbours.has_next == 1u { look(&sum, px, motion.zw, z, true); }
     let is_seen = sum.count > 0.0;
-    if HAS_FAR_PREV && !is_seen { look_far(&sum, px, motion, z, 0u, -2.0); }
-    if HAS_FAR_NEXT && !is_seen { look_far(&sum, px, motion, z, select(0u, 1u, HAS_FAR_PREV), 2.0); }
+    if neighbours.has_far_prev == 1u && !is_seen { look_far(&sum, px, motion, z, 0u, -2.0); }
+    if neighbours.has_far_next == 1u && !is_seen { look_far(&sum, px, motion, z, neighbours.has_far_prev, 2.0); }
     return sum;
 }
 
@@ -127,7 +133,7 @@ fn color_around(at: vec2f, is_next: bool) -> vec4f {
 fn color_there(px: vec2i, is_next: bool) -> vec4f {
     var color = vec4f(0.0);
     if is_next { color = textureLoad(next_color, px, 0); } else { color = textureLoad(prev_color, px, 0); }
-    if !RELIT { return color; }
+    if neighbours.relit == 0u { return color; }
     let k = px.y * i32(frame.size.x) + px.x;
     var gain = 0u;
     if is_next { gain = next_gains[k]; } else { gain = prev_gains[k]; }

@@ -6,6 +6,7 @@
 //#include methods/gather/shading/listed.wgsl
 //#include methods/gather/shading/moving.wgsl
 //#include methods/gather/shading/one_surface.wgsl
+//#include methods/gather/shading/changes/side.wgsl
 
 @group(1) @binding(0) var flow_other: texture_2d<f32>;      // stored as rgba16float: to the other neighbour; trust
 @group(1) @binding(1) var change: texture_2d<f32>;          // stored as rgba16float, by gain.wgsl; a: 1 where the neighbour shows the surface
@@ -20,11 +21,11 @@
 @group(1) @binding(15) var others: texture_2d<f32>;         // stored as rgba16float, by `find_bodies`
 @group(1) @binding(16) var others_out: Flow;                // as `bodies_out`: of bodies that move otherwise
 @group(1) @binding(17) var values_other: texture_2d<f32>;    // stored as rgba16float: of the other neighbour; 1 x 1: there is none
+@group(1) @binding(18) var<uniform> side: Side;
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
 
-override NEXT: bool = false;    // the neighbour is the next frame
 override COLORS: bool = false;  // the light is the picture itself: its differences may be texture, so that a guess has to explain more
 override SURE: f32 = select(0.5, 0.75, COLORS);             // how much the motion of a body has to explain
 override BODY_CLEARLY: f32 = select(0.83, 0.75, COLORS);    // as CLEARLY, of a body
@@ -135,7 +136,7 @@ fn compare_bodies(@builtin(local_invocation_index) local: u32, @builtin(workgrou
         let turns = select(0u, motions, is_one_surface(middle, place));
         for (var n = 0u; n < turns; n++) {
             let both = motion_of(id, n);
-            let way = select(both.xy, both.zw, NEXT);
+            let way = select(both.xy, both.zw, side.next == 1u);
             sums[n] += differs_by(vec2u(place), x + way, x - way, HIDDEN);
         }
     }
@@ -169,7 +170,7 @@ fn choose_body(@builtin(local_invocation_index) local: u32, @builtin(workgroup_i
 fn body_at(id: vec2u) -> vec2f {
     let cell = id / CELL;
     let both = textureLoad(bodies, cell, 0);
-    return select(both.xy, both.zw, NEXT);
+    return select(both.xy, both.zw, side.next == 1u);
 }
 
 /// Differences of what moves from frame to frame.

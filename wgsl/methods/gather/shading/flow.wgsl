@@ -16,11 +16,10 @@
 alias Patches = texture_storage_2d<rgba32float, write>;
 alias Flow = texture_storage_2d<rgba16float, write>;
 
-override LEVEL: u32 = 0u;       // of the pyramid, 0 the frame itself
-override APART: i32 = select(1, 2, LEVEL < 3u);     // from one pixel of a patch that is compared to the next [px]
+override IS_COARSE: bool = false;                   // see COARSE of flow.py
+override APART: i32 = select(2, 1, IS_COARSE);      // from one pixel of a patch that is compared to the next [px]
 override TAPS: i32 = PATCH / APART;                 // along a side; the gradients are those of all pixels
 
-const COARSE: u32 = 2u;         // levels beyond have all patches
 const PATCH: i32 = 12;          // side [px]
 const STRIDE: i32 = 4;          // from one patch to the next [px]
 const EVERY: i32 = 2;           // px of a coarse level from one to the next whose flow is told: patches begin at the others
@@ -135,8 +134,7 @@ fn coarse_flow(px: vec2i, last: vec2i) -> vec2f {
 
 /// False for a pixel of a level that is far from all changes. On coarse levels, patches are larger than what is near.
 fn counts(px: vec2i) -> bool {
-    let at = min(vec2u(px) << vec2u(LEVEL), frame.size - 1u);
-    return LEVEL > COARSE || is_near(at);
+    return IS_COARSE || is_near(in_frame(vec2u(px), textureDimensions(here)));
 }
 
 /// Each patch by itself.

@@ -51,3 +51,15 @@ fn mixed(square: Square, own: vec4f, right: vec4f, below: vec4f, both: vec4f) ->
 fn half_size() -> vec2u {
     return (frame.size + 1u) / 2u;
 }
+
+/// The number of a level of a pyramid, by its size: half that of the finer one, rounded up; 0 is the frame itself.
+fn level_of(size: vec2u) -> u32 {
+    let longer = vec2u(max(frame.size.x, frame.size.y), max(size.x, size.y));
+    let bits = firstLeadingBit(longer - 1u);
+    return bits.x - bits.y;
+}
+
+/// The pixel of the frame at which one of a level begins.
+fn in_frame(px: vec2u, size: vec2u) -> vec2u {
+    return min(px << vec2u(level_of(size)), frame.size - 1u);
+}

@@ -10,8 +10,6 @@
 
 alias Level = texture_storage_2d<rgba16float, write>;
 
-override LEVEL: u32 = 1u;       // that `halve` writes
-
 const FINE: u32 = 4u;           // level up to which a pixel and those beside it are in one tile and those beside it
 const CONTRAST: f32 = 0.2;      // of a logarithm of light
 
@@ -32,8 +30,9 @@ fn begin(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
 @compute @workgroup_size(WG_X, WG_Y)
 fn halve(@builtin(global_invocation_id) id: vec3u) {
     let px = vec2i(id.xy);
-    if any(px >= (vec2i(textureDimensions(source)) + 1) / 2) { return; }
-    if !PULLED && LEVEL <= FINE && is_black_around(min(id.xy << vec2u(LEVEL), frame.size - 1u)) {
+    let size = (textureDimensions(source) + 1u) / 2u;
+    if any(id.xy >= size) { return; }
+    if !PULLED && level_of(size) <= FINE && is_black_around(in_frame(id.xy, size)) {
         textureStore(level, px, vec4f(0.0));
         textureStore(squares, px, vec4f(0.0));
         return;

@@ -1,8 +1,5 @@
 // The frame and a neighbour, whose light is compared.
-
-struct Side {
-    next: u32,          // 1: the neighbour is the next frame; 0: the previous one
-}
+//#include methods/gather/shading/changes/side.wgsl
 
 @group(1) @binding(0) var<uniform> side: Side;
 @group(1) @binding(1) var light_here: texture_2d<f32>;     // stored as given
