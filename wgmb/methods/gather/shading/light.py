@@ -26,7 +26,8 @@ from .values import values
 
 _LISTS = "doubtful", "changing", "beside", "near", "whole"  # of tiles: see near.wgsl
 LONGEST = 480  # px of light along the longer side of an image, on what rests, at most
-NODES = 8  # times of an exposure at which light is known, at most
+LEAST_NODES, MOST_NODES = 4, 8  # times of an exposure at which light is known,
+NODES_PER_INTERVAL = 12  # as many in a frame interval within these bounds
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,9 @@ class LightTimes:
 
     @classmethod
     def within(cls, opens: float, closes: float, samples: int) -> LightTimes:
-        """The middles of as many equal parts of an exposure as there are samples, or NODES."""
-        count = min(samples, NODES)
+        """The middles of as many equal parts of an exposure as there are samples, or nodes."""
+        nodes = max(LEAST_NODES, math.ceil(NODES_PER_INTERVAL * (closes - opens)))
+        count = min(samples, nodes, MOST_NODES)
         step = max(closes - opens, 1e-6) / count
         return cls(opens + 0.5 * step, step, count)
 
