@@ -98,7 +98,24 @@ def test_every_shader_compiles_with_every_override(device, file):
     many = list(itertools.product((0, 1), repeat=len(names)))
     most = 1 if parts.TIER == "default" else 64
     for values in random.Random(7).sample(many, min(len(many), most)):
-        gpu.Kernel(device, wgsl.load(file), dict(zip(names, values, strict=True)))
+        kernel = gpu.Kernel(device, wgsl.load(file), dict(zip(names, values, strict=True)))
+        for entry in kernel.source.entry_points():
+            assert kernel.pipeline(entry) is kernel.pipeline(entry)
+
+
+def test_only_entry_points_that_run_are_compiled(device, folder, monkeypatch):
+    (folder / "two.wgsl").write_text(
+        ONE + "".join(f"@compute @workgroup_size(1)\nfn {name}() {{}}\n" for name in ("main", "b"))
+    )
+    made, make = [], type(device).create_compute_pipeline
+
+    def counted(device, **how):
+        made.append(how["compute"]["entry_point"])
+        return make(device, **how)
+
+    monkeypatch.setattr(type(device), "create_compute_pipeline", counted)
+    run(device, wgsl.load("two.wgsl"))
+    assert made == ["main"]
 
 
 MOST_LINES = 60  # of a function, from its name to its last brace

@@ -132,3 +132,35 @@ def test_lists_may_be_longer_than_a_row_of_workgroups(with_shader, kept):
 def test_nothing_that_moves_is_nothing_to_do():
     frame = shot(0)
     np.testing.assert_array_equal(wgmb.Blur("gather")(frame), frame.color)
+
+
+def test_textures_stay_while_neighbours_come_and_go(device):
+    blur = wgmb.Blur("gather", device=device)
+    frames = [ball(number, 12.0).locked() for number in range(3)]
+    held = []
+    for prev, own, after in zip([None, *frames], frames, [*frames[1:], None], strict=False):
+        blur(own.between(prev, after))
+        held.append(list(blur.method._layers.textures.values()))
+    assert all(
+        texture is first for now in held for texture, first in zip(now, held[0], strict=True)
+    )
+    alone = wgmb.Blur("gather", device=device)
+    alone(frames[0])
+    assert alone.method._layers.textures["surfaces"].size[2] == 2
+
+
+def test_neighbours_change_no_kernel(device, monkeypatch):
+    """A pass is compiled once for all frames of a sequence."""
+    made, make = [], kernels.Kernel.__init__
+
+    def counted(kernel, device, source, constants=None):
+        made.append(source.name)
+        make(kernel, device, source, constants)
+
+    kernels.forget_kernels()
+    monkeypatch.setattr(kernels.Kernel, "__init__", counted)
+    blur = wgmb.Blur("gather", device=device, shading="off")
+    frames = [ball(number, 12.0).locked() for number in range(3)]
+    for prev, own, after in zip([None, *frames], frames, [*frames[1:], None], strict=False):
+        blur(own.between(prev, after))
+    assert made.count("methods/gather/layers/layers.wgsl") == 1

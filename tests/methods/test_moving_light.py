@@ -707,3 +707,16 @@ def test_own_scenes_know_their_light():
     seen = np.abs(frame.color[..., :3] - frame.diffuse_light * frame.diffuse_color).max(axis=2)
     assert np.median(seen) < 0.02  # the rest is sky, gloss and edges
     assert np.ptp(frame.diffuse_light) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("degrees", "samples", "count"),
+    [(45, 16, 4), (180, 16, 6), (360, 64, 8), (720, 64, 8), (360, 3, 3)],
+)
+def test_light_is_known_at_times_all_over_the_exposure(degrees, samples, count):
+    half = degrees / 720
+    times = list(LightTimes.within(-half, half, samples))
+    assert len(times) == count
+    np.testing.assert_allclose(
+        times, (np.arange(count) + 0.5) / count * 2 * half - half, atol=1e-12
+    )
