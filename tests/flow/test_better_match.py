@@ -186,6 +186,43 @@ def test_a_search_whose_ways_lead_back_is_taken_throughout_though_it_matches_wor
     np.testing.assert_array_equal(is_searched, motion[..., 2] == np.float32(10.3))
 
 
+class Judge(Told):
+    """A source that says that too much is lost in some pictures."""
+
+    def __init__(self, lossy):
+        super().__init__({})
+        self.lossy = lossy
+
+    def shot(self, load, depth=True):
+        shot = super().shot(load, depth)
+        shot.loses = lambda number: number in self.lossy
+        return shot
+
+
+def test_only_pictures_in_which_the_judge_loses_something_are_searched():
+    pictures, quick, search = repeating()
+    shot = BetterMatch(quick, search, judge=Judge({2, 3})).shot(pictures.get)
+    plain = BetterMatch(quick, search).shot(pictures.get)
+    for number in (0, 1, 4):
+        np.testing.assert_array_equal(shot(number)[0], quick.motions[number][0])
+    assert not search.asked
+    for number in (2, 3):
+        np.testing.assert_array_equal(shot(number)[1], plain(number)[1])
+    assert set(search.asked) == {2, 3}
+    assert shot(COUNT) is None
+
+
+def test_what_moves_slowly_is_not_searched_by_the_best_search():
+    """Squares that pan by 2 px a frame, and the same with a disc at 44 px."""
+    pan = {n: shifted(2 * n, 96, 160) for n in range(5)}
+    fast = dict(enumerate(make.disc_before_squares(5, 44)))
+    for shown, is_searched in ((pan, False), (fast, True)):
+        search = Told({n: found(3, 0.5, *grey.shape) for n, grey in shown.items()})
+        pictures = {n: Both(grey, lambda: None) for n, grey in shown.items()}
+        BetterMatch(Dis("best"), search, judge=Dis("fast")).shot(pictures.get)(2)
+        assert bool(search.asked) == is_searched
+
+
 def test_where_neither_loses_clearly_less_the_match_decides():
     """The search loses as much: it follows the repeat as well, in the other pictures."""
     pictures, quick, search = repeating()

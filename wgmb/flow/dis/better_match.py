@@ -43,12 +43,20 @@ class BetterMatch:
     else. Where it loses much of a picture, that and its change count so many times, throughout.
 
     `by_ways`: the search is taken throughout where much of a picture is lost, and clearly less of
-    it by the search. For that, those beside a picture are searched, too.
+    it by the search. For that, those beside a picture are searched, too. `judge`: a picture is not
+    searched where this loses little, in it and in those beside it.
     """
 
-    def __init__(self, quick: Dis, search: Flow, margin: float = 1.0, by_ways: bool = False):
+    def __init__(
+        self,
+        quick: Dis,
+        search: Flow,
+        margin: float = 1.0,
+        by_ways: bool = False,
+        judge: Dis | None = None,
+    ):
         self._quick, self._search, self._margin = quick, search, margin
-        self._by_ways = by_ways
+        self._by_ways, self._judge = by_ways, judge
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on."""
@@ -74,10 +82,14 @@ class BetterMatch:
             return picture.light() if isinstance(picture, Both) else picture
 
         quick, search = _Source(self._quick.shot(grey, depth)), _Source(self._search.shot(light))
+        judge = None if self._judge is None else self._judge.shot(grey, depth=False)
 
         def better_of(number: int) -> Found | None:
-            one, other = quick(number), search(number)
-            if one is None or other is None:
+            one = quick(number)
+            if one is None or (judge is not None and not judge.loses(number)):
+                return one
+            other = search(number)
+            if other is None:
                 return None
             prev, here, next = (grey(n) for n in (number - 1, number, number + 1))
             assert here is not None
