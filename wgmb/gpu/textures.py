@@ -12,8 +12,8 @@ from ..errors import InputError
 from .device import SOFTWARE, check_size, submit
 
 _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
-_READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture,
-_READBACK_IN_SOFTWARE = 4 << 20  # where as much at a time is as quick
+_READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture;
+_READBACK_IN_SOFTWARE = 4 << 20  # without a GPU, where less at once is as quick
 _HALF_MAX = 65504.0  # largest finite f16
 _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}

@@ -59,8 +59,8 @@ class FlowSettings:
             from ..flow.dis.better_match import BetterMatch
 
             search = Flow(quality="fast", device=device, whole=True)
-            both, judge = (Dis("best"), search), Dis("fast")
-            return BetterMatch(*both, _BEST_MARGIN, by_ways=True, judge=judge), how
+            best, judge = Dis("best"), Dis("fast")
+            return BetterMatch(best, search, _BEST_MARGIN, by_ways=True, judge=judge), how
         return Flow(quality=settings.flow_quality, device=device), how
 
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:

@@ -12,6 +12,8 @@ from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer
 from .active_tiles import grid_of, uniform
 
+_MOST = 3  # frames that are scattered: the frame itself and its neighbours
+
 
 class Scatter:
     """Pixels of the frame, and of its neighbours those that it hides, scattered to the blocks where
@@ -37,8 +39,9 @@ class Scatter:
         slice_size = 4 * blocks * len(_near(inputs))
         limit = self._device.limits["max-storage-buffer-binding-size"]
         size = slice_size * max(min(most, inputs.samples, limit // slice_size), 1)
-        three = min(3 * size // len(_near(inputs)), limit) if len(_near(inputs)) > 1 else size
-        scattered = {"buffer": self._scattered.at_least(three), "offset": 0, "size": size}
+        count = len(_near(inputs))
+        room = size if count == 1 else min(_MOST * size // count, limit)  # for all, as in layers.py
+        scattered = {"buffer": self._scattered.at_least(room), "offset": 0, "size": size}
         encoder.clear_buffer(scattered["buffer"], 0, size)
         return scattered
 
