@@ -6,7 +6,7 @@ to every 4th or 8th picture. The truth of a picture that is kept is the mean, in
 those around it over half of the interval, the first and the last by half. Every result goes through
 the same 8-bit YUV 4:4:4 as FFmpeg's minterpolate works in. `--frames 2` blurs two successive
 pictures and adds flicker: the mean change of the error from one to the next, in levels of 255.
-`--crops FOLDER` writes the pictures. Takes minutes on a GPU, half an hour without.
+`--crops FOLDER` writes the pictures. Takes minutes on a GPU, three quarters of an hour without.
 """
 
 import argparse
@@ -144,6 +144,7 @@ def makers() -> Iterator[tuple[str, Callable[[Pictures, int], Pictures]]]:
     yield "`dis` fast, `tap`", blurred(flow="dis", flow_quality="fast")
     yield "`dis` best, `gather`", blurred(flow="dis", flow_quality="best", method="gather")
     yield "`search` draft, `gather`", blurred(flow="search", flow_quality="draft")
+    yield "`search`", blurred(flow="search")
     yield "`auto`", blurred()
     yield "minterpolate 16x", interpolated
 

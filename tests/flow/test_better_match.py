@@ -1,5 +1,7 @@
 """Motion of two sources, per pixel that which matches better; and which pictures need both."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from wgmb.flow import Flow
 pytest.importorskip("cv2")
 
 from wgmb.flow.dis import Dis
-from wgmb.flow.dis.better_match import AROUND, BetterMatch, Both, better
+from wgmb.flow.dis.better_match import AROUND, BetterMatch, Both, chosen, costs
 
 
 def shifted(shift, height, width):
@@ -23,6 +25,11 @@ def found(dx, depth, height, width):
     way = np.zeros((height, width, 4), np.float32)
     way[..., 0], way[..., 2] = -dx, dx
     return way, np.full((height, width), depth, np.float32)
+
+
+def better(near, one, other, *how):
+    ours, its = costs(near, one[0], other[0], *how)
+    return chosen(one, other, its < ours)
 
 
 @pytest.mark.parametrize("height, width", [(90, 221), (203, 601), (100, 481)])
@@ -201,10 +208,12 @@ class Judge(Told):
 
 def test_only_pictures_in_which_the_judge_loses_something_are_searched():
     pictures, quick, search = repeating()
-    shot = BetterMatch(quick, search, judge=Judge({2, 3})).shot(pictures.get)
+    shot = BetterMatch(quick, search, judge=Judge({2, 3}), others=[(0.4, 9)]).shot(pictures.get)
     plain = BetterMatch(quick, search).shot(pictures.get)
     for number in (0, 1, 4):
         np.testing.assert_array_equal(shot(number)[0], quick.motions[number][0])
+        ((share, motion),) = shot.hypotheses(number)
+        assert share == 1 and motion is quick.motions[number]
     assert not search.asked
     for number in (2, 3):
         np.testing.assert_array_equal(shot(number)[1], plain(number)[1])
@@ -221,6 +230,55 @@ def test_what_moves_slowly_is_not_searched_by_the_best_search():
         pictures = {n: Both(grey, lambda: None) for n, grey in shown.items()}
         BetterMatch(Dis("best"), search, judge=Dis("fast")).shot(pictures.get)(2)
         assert bool(search.asked) == is_searched
+
+
+def halves():
+    """Three pictures that move by 2 px; the quick source is right on the left, the search right."""
+    height, width = 96, 320
+    pictures = {n: Both(shifted(2 * n, height, width), lambda: None) for n in range(3)}
+    one, other = found(2, 1.0, height, width), found(4, 0.5, height, width)
+    one[0][:, width // 2 :] *= 2
+    other[0][:, width // 2 :] /= 2
+    return pictures, one, other
+
+
+def test_a_second_hypothesis_takes_the_search_where_it_costs_at_most_so_much_more():
+    """The search is not taken on the left, for a cost of more than ten times as much."""
+    pictures, one, other = halves()
+    quick, search = (Told(dict.fromkeys(pictures, f)) for f in (one, other))
+
+    def shot(times):
+        return BetterMatch(quick, search, others=[(0.3, times)]).shot(pictures.get)
+
+    near = [pictures[n].grey for n in range(3)]
+    ours, its = costs(near, one[0], other[0])
+    likeliest = BetterMatch(quick, search).shot(pictures.get)(1)
+    taken = [likeliest[1] == 0.5]
+    for times in (1.5, 3, 10):
+        (first, plain), (share, second) = shot(times).hypotheses(1)
+        assert first == 0.7 and share == 0.3
+        for got, expected in zip(plain, likeliest, strict=True):
+            np.testing.assert_array_equal(got, expected)
+        np.testing.assert_array_equal(shot(times)(1)[1], likeliest[1])
+        motion, depth = second
+        np.testing.assert_array_equal(depth == 0.5, its < times * ours)
+        np.testing.assert_array_equal(motion[depth == 0.5], other[0][depth == 0.5])
+        np.testing.assert_array_equal(motion[depth == 1], one[0][depth == 1])
+        taken.append(depth == 0.5)
+    for less, more in pairwise(taken):
+        assert (less <= more).all() and (less < more).any()
+    assert not taken[-1][24:-24, 24:120].any()
+    assert len(shot(1).hypotheses(1)) == 1 and not shot(2).hypotheses(7)
+
+
+def test_costs_of_what_matches_and_does_not_change_are_none_and_sources_may_change_places():
+    pictures, one, other = halves()
+    near = [pictures[n].grey for n in range(3)]
+    ours, its = costs(near, one[0], other[0])
+    for got, expected in zip((its, ours), costs(near, other[0], one[0]), strict=True):
+        np.testing.assert_array_equal(got, expected)
+    assert (ours[24:-24, 24:120] < 1).all() and (its[24:-24, 200:-24] < 1).all()
+    assert (ours[24:-24, 200:-24] > 10).all() and (its[24:-24, 24:120] > 10).all()
 
 
 def test_where_neither_loses_clearly_less_the_match_decides():

@@ -68,7 +68,11 @@ class VideoExposure:
     def __call__(self, at, interval, shutter):
         cells = self.shots.cells(at, interval, shutter)
         size = self.shots[cells[0].index].content.coded.size
-        parts = ((cell, self.views.in_shot(cell.index), self._blur) for cell in cells)
+        parts = (
+            (cell, frame, self._blur)
+            for cell in cells
+            for _, frame in self.views.in_shot(cell.index)
+        )
         texture = self._exposer.texture(size, parts)
         return self.array(texture)[..., :3]
 
@@ -77,7 +81,7 @@ class VideoExposure:
         return self._images.download(encoder, texture)
 
     def motion(self, index):
-        return self.array(self.views.in_shot(index).frame.motion.texture)
+        return self.array(self.views.in_shot(index)[0][1].frame.motion.texture)
 
 
 def linear_average(at, interval, degrees, fps=240.0, count=40):

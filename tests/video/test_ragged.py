@@ -132,7 +132,7 @@ def motion_of(device, source, depth=True):
     shots = ShotReader(iter([Picture(n / 25, None, n) for n in range(5)]))
     shots.at(0.08, 4)
     motion = VideoMotion(source, shots, device, depth)
-    return motion, {n: motion.textures(n) for n in (1, 2, 3)}
+    return motion, {n: motion.hypotheses(n)[0] for n in (1, 2, 3)}
 
 
 def down(device, texture):
@@ -144,7 +144,7 @@ def test_the_motion_of_a_video_is_nowhere_ragged(device, depth):
     """As arrays, which the viewer takes, and as textures, which a blur takes."""
     source = Speckled()
     motion, kept = motion_of(device, source, depth)
-    for n, (ways, far) in kept.items():
+    for n, (_, ways, far) in kept.items():
         found, found_depth = motion(n)
         np.testing.assert_array_equal(down(device, ways), found)
         assert (far is None) == (found_depth is None) == (not depth)
@@ -159,7 +159,7 @@ def test_dense_inverse_search_alone_is_left_as_it_is(device, monkeypatch):
     source = Speckled()
     monkeypatch.setattr(Dis, "shot", lambda self, load, depth=True: source.shot(load, depth))
     motion, kept = motion_of(device, Dis("fast"))
-    for n, (ways, far) in kept.items():
+    for n, (_, ways, far) in kept.items():
         np.testing.assert_array_equal(down(device, ways), source.motion(n))
         np.testing.assert_array_equal(motion(n)[0], source.motion(n))
         assert (down(device, far) == 1).all()

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 _FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
 _MARGIN = 1.6  # of that search beside dense inverse search, see BetterMatch,
-_BEST_MARGIN = 1.3  # and of the best one
+_BEST_MARGIN = 1.3  # and of the best one;
+_OTHERS = (1 / 3, 2.0), (1 / 3, 0.875)  # its further hypotheses, see there
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,13 +61,14 @@ class FlowSettings:
 
             search = Flow(quality="fast", device=device, whole=True)
             best, judge = Dis("best"), Dis("fast")
-            return BetterMatch(best, search, _BEST_MARGIN, by_ways=True, judge=judge), how
+            more = {"by_ways": True, "judge": judge, "others": _OTHERS}
+            return BetterMatch(best, search, _BEST_MARGIN, **more), how
         return Flow(quality=settings.flow_quality, device=device), how
 
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:
         """True if the best search takes dense inverse search where that matches better.
 
-        Without a GPU, both take two fifths of the time of the best search alone.
+        Without a GPU, both take half to nine tenths of the time of the best search alone.
         """
         is_best = self.flow == "search" and self.flow_quality == "best"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain, islice
 from typing import Any, Protocol
@@ -165,21 +165,23 @@ class Exposures:
         """
         begins = True
 
-        def part(cell: Cell) -> Part:
+        def parts(cell: Cell) -> list[Part]:
             nonlocal begins
             loses = len(views) > 1 and views[0][0].loses(cell.index)
             frames, blur = views[loses]
             self._used.add(blur.method.name)
-            frame = frames.in_shot(cell.index)
+            found = frames.in_shot(cell.index)
             if frames.change(cell, begins):
                 begins = False
-            return cell, frame, blur
+            return [(replace(cell, share=share * cell.share), one, blur) for share, one in found]
 
         size = shots[cells[0].index].content.coded.size
-        if is_coded and len(cells) == 1:
-            light = self._sum.alone(part(cells[0]))
+        first = parts(cells[0])
+        if is_coded and len(cells) == len(first) == 1:
+            light = self._sum.alone(first[0])
         else:
-            light = self._sum.texture(size, map(part, cells))
+            rest = chain.from_iterable(map(parts, cells[1:]))
+            light = self._sum.texture(size, chain(first, rest))
         return light, None if begins else views[0][0].changing.changes(size)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import wgpu
 
@@ -20,6 +22,7 @@ from .planes import Planes
 from .ragged import KEPT
 from .thumbnail import Thumbnail
 
+_Frames = Sequence[tuple[float, FrameViews]]
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
 
 
@@ -50,20 +53,26 @@ class VideoFrames:
         self._held = self._holdout.of(shots)
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
-        self._frames: dict[int, FrameViews] = {}
+        self._frames: dict[int, _Frames] = {}
 
-    def in_shot(self, index: int) -> FrameInShot:
+    def in_shot(self, index: int) -> Sequence[tuple[float, FrameInShot]]:
         """A picture, between its neighbours if the method takes them.
 
-        What it refers to may be overwritten once two others have been asked for.
+        It is the sum of so much of each, one for each hypothesis about its motion, or about that of
+        neighbours. What they refer to may be overwritten once two others have been asked for.
         """
         wanted = [index]
         if self._source is not None and self._neighbours:
             wanted = [i for i in (index - 1, index, index + 1) if self._shots.moves_on(index, i)]
         found = {i: self._frame(i) for i in wanted}
-        near = (found.get(i) for i in (index - 1, index + 1))
-        before, after = (one if one is not None and one.has_vectors else None for one in near)
-        return FrameInShot(found[index], before, after, self._shots[index].number)
+        made: list[tuple[float, FrameInShot]] = []
+        for number, (share, _) in enumerate(max(found.values(), key=len)):
+            views = {i: of[min(number, len(of) - 1)][1] for i, of in found.items()}
+            near = (views.get(i) for i in (index - 1, index + 1))
+            before, after = (one if one is not None and one.has_vectors else None for one in near)
+            shown = FrameInShot(views[index], before, after, self._shots[index].number)
+            made.append((share, shown))
+        return made
 
     def change(self, cell: Cell, begins: bool) -> bool:
         """Submit what the light changes in the part of an exposure that `cell` is.
@@ -71,7 +80,7 @@ class VideoFrames:
         `begins`: it is the first part that does. False where there is no motion.
         """
         index = cell.index
-        frame = self._frame(index)
+        frame = self._frame(index)[0][1]
         if frame.motion is None or cell.shutter.degrees <= 0:
             return False
         near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
@@ -88,16 +97,18 @@ class VideoFrames:
         shot = None if self._source is None else self._source.shot(index)
         return isinstance(shot, DisShot) and shot.loses(index)
 
-    def _frame(self, index: int) -> FrameViews:
-        """The views of one picture."""
+    def _frame(self, index: int) -> _Frames:
+        """The views of one picture, and its share, for each hypothesis about its motion."""
         kept = self._frames.get(index)
         light = self._light(index).create_view()
-        if kept is not None and index in self._lights and kept.color.texture is light.texture:
+        if kept is not None and index in self._lights and kept[0][1].color.texture is light.texture:
             return kept
-        found = self._motion(index)
-        motion, depth = found or (None, None)
-        holdout = self._held_out(index) if found else None
-        made = FrameViews(color=light, motion=motion, depth=depth, holdout=holdout, key=object())
+        motions = self._motions(index) or [(1.0, None, None)]
+        holdout = None if motions[0][1] is None else self._held_out(index)
+        made = [
+            (share, FrameViews(color=light, motion=m, depth=d, holdout=holdout, key=object()))
+            for share, m, d in motions
+        ]
         while len(self._frames) >= KEPT:
             self._frames.pop(next(iter(self._frames)))
         self._frames[index] = made
@@ -118,18 +129,15 @@ class VideoFrames:
             self._planes.draw(coded, texture)
         return texture
 
-    def _motion(self, index: int) -> tuple[View, View | None] | None:
-        """Motion of a picture within its own interval of time, and depth if the method reads it."""
-        if self._source is None:
-            return None
-        textures = self._source.textures(index)
-        if textures is None:
-            return None
-        motion, depth = textures
-        factors = self._factors(index)
-        if factors != (1.0, 1.0):
-            motion = self._paced(motion, index, factors)
-        return motion.create_view(), None if depth is None else depth.create_view()
+    def _motions(self, index: int) -> Sequence[tuple[float, View, View | None]]:
+        """Shares and motions of a picture within its own interval, and depth if it is read."""
+        factors, made = self._factors(index), []
+        hypotheses = [] if self._source is None else self._source.hypotheses(index)
+        for number, (share, motion, depth) in enumerate(hypotheses):
+            if factors != (1.0, 1.0):
+                motion = self._paced(motion, f"motion {index % KEPT} {number}", factors)
+            made.append((share, motion.create_view(), depth and depth.create_view()))
+        return made
 
     def _held_out(self, index: int) -> View | None:
         """Mask of what stays sharp in a picture."""
@@ -150,11 +158,11 @@ class VideoFrames:
         return evened(times, near.index(index), (back, ahead))
 
     def _paced(
-        self, motion: wgpu.GPUTexture, index: int, factors: tuple[float, float]
+        self, motion: wgpu.GPUTexture, name: str, factors: tuple[float, float]
     ) -> wgpu.GPUTexture:
         """A copy of a motion, multiplied."""
         size = motion.size[0], motion.size[1]
-        output = self._images.texture(f"motion {index % KEPT}", size, "rgba32float")
+        output = self._images.texture(name, size, "rgba32float")
         file = "video/gpu_frames.wgsl"
         encoder = self._device.create_command_encoder(label="pace")
         gpu.kernel(self._device, file).run(

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import wgpu
 
 from ..flow import Flow, Shot
 from ..flow.dis import Dis
-from ..flow.dis.better_match import BetterMatch, Both
+from ..flow.dis.better_match import BetterMatch, Both, Hypothesis, MixedShot
 from ..gpu.textures import TexturePool
 from ..shots.motion import Found, MotionSource, ShotMotion
 from ..shots.reader import ShotReader
 from .planes import Planes
 from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
+
+
+class Ways(NamedTuple):
+    """A hypothesis about the motion of a picture, on the GPU; depth where it is wanted."""
+
+    share: float
+    motion: wgpu.GPUTexture
+    depth: wgpu.GPUTexture | None
 
 
 class VideoMotion(ShotMotion):
@@ -39,43 +48,58 @@ class VideoMotion(ShotMotion):
         is_searched = not isinstance(source, Dis)  # dense inverse search alone is smooth
         self._ragged = RaggedMotion(device) if is_searched else None
 
-    def textures(self, index: int) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture | None] | None:
-        """Motion and depth of a picture on the GPU, valid as RaggedMotion says.
+    def hypotheses(self, index: int) -> Sequence[Ways]:
+        """Those about the motion of a picture, the likeliest first; none where it is alone.
 
-        None where it is alone; the depth may lack where none is wanted.
+        They are valid as RaggedMotion says.
         """
         shot = self.shot(index)
-        if isinstance(shot, Shot):
-            textures = shot.textures(index)
-            if textures is None:
-                return None
-            motion, depth = textures.motion, textures.depth
-        else:
-            found = shot(index)
-            if found is None:
-                return None
-            place = 0 if self._ragged else index % KEPT
-            motion = self._images.upload(f"motion {place}", found[0], "rgba32float").texture
-            depth = None
-            if found[1] is not None:
-                depth = self._images.upload(f"depth {place}", found[1], "r32float").texture
-        return self._ragged(index, motion, depth) if self._ragged else (motion, depth)
+        if isinstance(shot, MixedShot):
+            return self._uploaded(index, shot.hypotheses(index))
+        return self._of(index)
 
     def __call__(self, number: int) -> Found | None:
-        """Motion (height, width, 4) [px] and depth of a picture; None where it is alone."""
+        """The likeliest motion (height, width, 4) [px] of a picture, and depth; None if alone."""
         if self._ragged is None:
             return super().__call__(number)
-        textures = self.textures(number)
-        if textures is None:
-            return None
-        motion, depth = (
-            None
-            if texture is None
-            else self._images.download(self._device.create_command_encoder(), texture)
-            for texture in textures
-        )
-        assert motion is not None
-        return motion, None if depth is None else depth[..., 0]
+        for _, motion, depth in self._of(number):
+            return self._down(motion), None if depth is None else self._down(depth)[..., 0]
+        return None
+
+    def _of(self, index: int) -> Sequence[Ways]:
+        """The likeliest motion alone."""
+        shot = self.shot(index)
+        if isinstance(shot, Shot):
+            found = shot.textures(index)
+            return [] if found is None else [self._smooth(index, 0, 1.0, found.motion, found.depth)]
+        found = shot(index)
+        return [] if found is None else self._uploaded(index, [Hypothesis(1.0, found)])
+
+    def _uploaded(self, index: int, hypotheses: Sequence[Hypothesis]) -> Sequence[Ways]:
+        made: list[Ways] = []
+        place = 0 if self._ragged else index % KEPT
+        for number, (share, (motion, depth)) in enumerate(hypotheses):
+            ways = self._images.upload(f"motion {place}", motion, "rgba32float").texture
+            if depth is not None:
+                depth = self._images.upload(f"depth {place}", depth, "r32float").texture
+            made.append(self._smooth(index, number, share, ways, depth))
+        return made
+
+    def _smooth(
+        self,
+        index: int,
+        number: int,
+        share: float,
+        motion: wgpu.GPUTexture,
+        depth: wgpu.GPUTexture | None,
+    ) -> Ways:
+        """A hypothesis, nowhere ragged."""
+        if self._ragged is None:
+            return Ways(share, motion, depth)
+        return Ways(share, *self._ragged(index, motion, depth, number))
+
+    def _down(self, texture: wgpu.GPUTexture) -> Any:
+        return self._images.download(self._device.create_command_encoder(), texture)
 
 
 class _Searched:

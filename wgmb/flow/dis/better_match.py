@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,16 @@ class Both(NamedTuple):
     light: Callable[[], Any]
 
 
+Load = Callable[[int], Both | np.ndarray | None]
+
+
+class Hypothesis(NamedTuple):
+    """A motion that a picture may have, and the share of the picture that follows it, of 1."""
+
+    share: float
+    motion: Found
+
+
 class BetterMatch:
     """Motion and depth order from dense inverse search and from a search, the better per place.
 
@@ -44,7 +55,9 @@ class BetterMatch:
 
     `by_ways`: the search is taken throughout where much of a picture is lost, and clearly less of
     it by the search. For that, those beside a picture are searched, too. `judge`: a picture is not
-    searched where this loses little, in it and in those beside it.
+    searched where this loses little, in it and in those beside it. `others`: further
+    hypotheses, each the share of a picture that follows it, and how many times the cost of dense
+    inverse search the search may have there.
     """
 
     def __init__(
@@ -54,56 +67,93 @@ class BetterMatch:
         margin: float = 1.0,
         by_ways: bool = False,
         judge: Dis | None = None,
+        others: Sequence[tuple[float, float]] = (),
     ):
-        self._quick, self._search, self._margin = quick, search, margin
-        self._by_ways, self._judge = by_ways, judge
+        self.quick, self.search, self.margin = quick, search, margin
+        self.by_ways, self.judge, self.others = by_ways, judge, tuple(others)
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on."""
-        quick, search = self._quick.reach(size), self._search.reach(size)
-        return max(quick, self._by_ways + search)
+        return max(self.quick.reach(size), self.by_ways + self.search.reach(size))
 
-    def shot(
-        self, load: Callable[[int], Both | np.ndarray | None], depth: bool = True
-    ) -> Callable[[int], Found | None]:
+    def shot(self, load: Load, depth: bool = True) -> MixedShot:
         """Motion (height, width, 4) [px] and depth of a shot's pictures.
 
         `load` gives them as Both, or (height, width, 3 or 4), linear.
         """
+        return _BetterOfShot(self, load, depth)
+
+
+class MixedShot(ABC):
+    """Motion of the pictures of a shot, of which there may be several hypotheses."""
+
+    @abstractmethod
+    def __call__(self, number: int) -> Found | None:
+        """The likeliest motion (height, width, 4) [px] of a picture, and depth; None if alone."""
+
+    @abstractmethod
+    def hypotheses(self, number: int) -> Sequence[Hypothesis]:
+        """All of them, the likeliest first; none if the picture is alone.
+
+        Where nobody knows the motion, the mean of blurs errs less than one blur: Girod, "Efficiency
+        Analysis of Multihypothesis Motion-Compensated Prediction for Video Coding" (2000).
+        """
+
+
+class _BetterOfShot(MixedShot):
+    def __init__(self, source: BetterMatch, load: Load, depth: bool):
+        self._source = source
 
         def grey(number: int) -> np.ndarray | None:
             picture = load(number)
             if picture is None:
                 return None
-            return picture.grey if isinstance(picture, Both) else self._quick.grey(picture)
+            return picture.grey if isinstance(picture, Both) else source.quick.grey(picture)
 
         def light(number: int) -> Any:
             picture = load(number)
             return picture.light() if isinstance(picture, Both) else picture
 
-        quick, search = _Source(self._quick.shot(grey, depth)), _Source(self._search.shot(light))
-        judge = None if self._judge is None else self._judge.shot(grey, depth=False)
+        self._grey, self._quick = grey, _Source(source.quick.shot(grey, depth))
+        self._search = _Source(source.search.shot(light))
+        judge = source.judge
+        self._judge = None if judge is None else judge.shot(grey, depth=False)
 
-        def better_of(number: int) -> Found | None:
-            one = quick(number)
-            if one is None or (judge is not None and not judge.loses(number)):
-                return one
-            other = search(number)
-            if other is None:
-                return None
-            prev, here, next = (grey(n) for n in (number - 1, number, number + 1))
-            assert here is not None
-            changes = changing(self._quick.change(prev, here, next))
-            loss = quick.lost(number, changes)
-            is_much = loss.mean() > MUCH
-            if self._by_ways and is_much:
-                others = search.lost(number, changes)
-                clearly = AT_ENDS if prev is None or next is None else CLEARLY
-                if others.mean() < clearly * loss.mean():
-                    return other[0], None if one[1] is None else other[1]
-            return better([prev, here, next], one, other, self._margin, None if is_much else loss)
+    def __call__(self, number: int) -> Found | None:
+        found = self._of(number, ())
+        return found[0].motion if found else None
 
-        return better_of
+    def hypotheses(self, number: int) -> Sequence[Hypothesis]:
+        return self._of(number, self._source.others)
+
+    def _of(self, number: int, others: Sequence[tuple[float, float]]) -> Sequence[Hypothesis]:
+        source, one = self._source, self._quick(number)
+        if one is None:
+            return []
+        if self._judge is not None and not self._judge.loses(number):
+            return [Hypothesis(1.0, one)]
+        other = self._search(number)
+        if other is None:
+            return []
+        prev, here, next = (self._grey(n) for n in (number - 1, number, number + 1))
+        assert here is not None
+        changes = changing(source.quick.change(prev, here, next))
+        loss = self._quick.lost(number, changes)
+        is_much = loss.mean() > MUCH
+        if source.by_ways and is_much:
+            lost = self._search.lost(number, changes)
+            clearly = AT_ENDS if prev is None or next is None else CLEARLY
+            if lost.mean() < clearly * loss.mean():
+                searched = other[0], None if one[1] is None else other[1]
+                return [Hypothesis(1.0, searched)]
+        loss = None if is_much else loss
+        ours, its = costs([prev, here, next], one[0], other[0], source.margin, loss)
+        takes = its < ours
+        also = [(share, its < np.float32(times) * ours) for share, times in others]
+        if all((takes == there).all() for _, there in also):
+            return [Hypothesis(1.0, chosen(one, other, takes))]
+        every = [(1 - sum(share for share, _ in also), takes), *also]
+        return [Hypothesis(share, chosen(one, other, there)) for share, there in every]
 
 
 class _Source:
@@ -140,38 +190,44 @@ class _Source:
         return found
 
 
-def better(
+def costs(
     near: list[np.ndarray | None],
-    one: Found,
-    other: Found,
+    one: np.ndarray,
+    other: np.ndarray,
     margin: float = 1.0,
     loss: np.ndarray | None = None,
-) -> Found:
-    """`other` where its cost, averaged over some pixels, is less than that of `one`.
+) -> list[np.ndarray]:
+    """Those of either motion, averaged over some pixels: (rows, columns) [levels of 255] each.
 
-    `near`: a picture between its neighbours, of which one may lack, (height, width) uint8. `loss`:
-    of blocks of `SPACING`, bool, where `one` is lost, and its difference to the neighbour that fits
-    better counts `margin` times; None: that and its change do, throughout.
+    They are for every so many pixels that the longer side has at most `LONGEST`. `near`: a picture
+    between its neighbours, of which one may lack, (height, width) uint8. `loss`: of blocks of
+    `SPACING`, bool, where `one` is lost, and its difference to the neighbour that fits better
+    counts `margin` times; None: that and its change do, throughout.
     """
     cv2: Any = importlib.import_module("cv2")
     here = near[1]
     assert here is not None
-    height, width = here.shape
-    step = -(-max(here.shape) // LONGEST)
+    step = _step(here.shape)
     small = [None if g is None else _small(g, step).astype(np.float32) for g in near]
-    thin = [
-        np.ascontiguousarray(motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
-        for motion, _ in (one, other)
-    ]
-    matches = [_match(small, motion) for motion in thin]
-    differences, others = ([match[k] for match in matches] for k in (0, 1))
-    if loss is not None:
-        differences[0] *= 1 + (np.float32(margin) - 1) * _grown(loss, differences[0].shape)
-    costs = [d + ROUGH * _roughness(m) for d, m in zip(differences, thin, strict=True)]
+    ours, its = (
+        _measured(small, motion[step // 2 :: step, step // 2 :: step] / np.float32(step))
+        for motion in (one, other)
+    )
+    difference, change, to_worse = ours
     if loss is None:
-        costs[0] *= np.float32(margin)
-    gain = cv2.blur(costs[0] - costs[1] + (others[0] - others[1]), (AROUND, AROUND))
-    takes = np.repeat(np.repeat(gain > 0, step, axis=0), step, axis=1)
+        difference, change = (np.float32(margin) * part for part in (difference, change))
+    else:
+        factor = 1 + (np.float32(margin) - 1) * _grown(loss, difference.shape)
+        difference = factor * difference
+    around = AROUND, AROUND
+    return [cv2.blur(sum(parts), around) for parts in ((difference, change, to_worse), its)]
+
+
+def chosen(one: Found, other: Found, takes: np.ndarray) -> Found:
+    """`other` where `takes`, which is for every so many pixels, as costs are."""
+    height, width = one[0].shape[:2]
+    step = _step((height, width))
+    takes = np.repeat(np.repeat(takes, step, axis=0), step, axis=1)
     rows, columns = (n - m for n, m in zip((height, width), takes.shape, strict=True))
     takes = np.pad(takes, ((0, max(rows, 0)), (0, max(columns, 0))), mode="edge")
     takes = takes[:height, :width]
@@ -181,16 +237,25 @@ def better(
     return motion, np.where(takes, other[1], one[1])
 
 
+def _step(shape: tuple[int, ...]) -> int:
+    """Pixels from one to the next that are compared."""
+    return -(-max(shape) // LONGEST)
+
+
 def _small(grey: np.ndarray, step: int) -> np.ndarray:
     """The means around the pixels [step // 2 :: step] of a picture."""
     cv2: Any = importlib.import_module("cv2")
     return cv2.blur(grey, (step, step))[step // 2 :: step, step // 2 :: step]
 
 
-def _match(near: list[np.ndarray | None], motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean difference of patches along a motion: to the neighbour that fits better, to the other.
+def _measured(
+    near: list[np.ndarray | None], motion: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Costs of a motion: of its difference to the neighbour that fits better, of its change from
+    pixel to pixel, and of its difference to the other neighbour.
 
-    That to the other is at most `MOST_OTHER`, and 0 where there is none.
+    Differences are means of patches. That to the other is at most `MOST_OTHER`, and 0 where there
+    is none.
     """
     cv2: Any = importlib.import_module("cv2")
     prev, here, next = near
@@ -204,7 +269,8 @@ def _match(near: list[np.ndarray | None], motion: np.ndarray) -> tuple[np.ndarra
             moved = cv2.remap(other, *at, cv2.INTER_LINEAR, borderMode=edge)
             found.append(cv2.blur(np.abs(moved - here), (PATCH, PATCH)))
     worse = np.maximum.reduce(found) if len(found) > 1 else np.zeros_like(found[0])
-    return np.minimum.reduce(found), np.minimum(worse, np.float32(MOST_OTHER))
+    worse = np.minimum(worse, np.float32(MOST_OTHER))
+    return np.minimum.reduce(found), ROUGH * _roughness(motion), worse
 
 
 def _roughness(motion: np.ndarray) -> np.ndarray:
