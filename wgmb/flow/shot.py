@@ -84,7 +84,7 @@ EFFORTS = {
     "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, above=440, longest=440),
 }
 # "fast" at full size without a GPU, where it is to be thorough:
-WHOLE = replace(EFFORTS["fast"], finest=1, polish=2, aside=0.2, at_edges=True)
+WHOLE = replace(EFFORTS["fast"], finest=2, polish=2, aside=0.25, at_edges=True)
 IN_SOFTWARE = {"fast": replace(EFFORTS["fast"], above=1280, longest=960)}  # instead, without a GPU
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
