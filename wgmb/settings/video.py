@@ -68,7 +68,7 @@ class FlowSettings:
     def _is_mixed(self, device: wgpu.GPUDevice) -> bool:
         """True if the best search takes dense inverse search where that matches better.
 
-        Without a GPU, both take half to nine tenths of the time of the best search alone.
+        Without a GPU, clips take half of the time of the best search alone.
         """
         is_best = self.flow == "search" and self.flow_quality == "best"
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
