@@ -71,7 +71,9 @@ class VideoMotion(ShotMotion):
         shot = self.shot(index)
         if isinstance(shot, Shot):
             found = shot.textures(index)
-            return [] if found is None else [self._smooth(index, 0, 1.0, found.motion, found.depth)]
+            if found is None:
+                return []
+            return [Ways(1.0, *self._smooth(index, 0, found.motion, found.depth))]
         found = shot(index)
         return [] if found is None else self._uploaded(index, [Hypothesis(1.0, found)])
 
@@ -82,21 +84,18 @@ class VideoMotion(ShotMotion):
             ways = self._images.upload(f"motion {place}", motion, "rgba32float").texture
             if depth is not None:
                 depth = self._images.upload(f"depth {place}", depth, "r32float").texture
-            made.append(self._smooth(index, number, share, ways, depth))
+            made.append(Ways(share, *self._smooth(index, number, ways, depth)))
         return made
 
     def _smooth(
         self,
         index: int,
         number: int,
-        share: float,
         motion: wgpu.GPUTexture,
         depth: wgpu.GPUTexture | None,
-    ) -> Ways:
-        """A hypothesis, nowhere ragged."""
-        if self._ragged is None:
-            return Ways(share, motion, depth)
-        return Ways(share, *self._ragged(index, motion, depth, number))
+    ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]:
+        """Motion and depth of a hypothesis, nowhere ragged."""
+        return self._ragged(index, motion, depth, number) if self._ragged else (motion, depth)
 
     def _down(self, texture: wgpu.GPUTexture) -> Any:
         return self._images.download(self._device.create_command_encoder(), texture)

@@ -95,7 +95,7 @@ class MixedShot(ABC):
     def hypotheses(self, number: int) -> Sequence[Hypothesis]:
         """All of them, the likeliest first; none if the picture is alone.
 
-        Where nobody knows the motion, the mean of blurs errs less than one blur: Girod, "Efficiency
+        Where nobody knows the motion, the mean of blurs errs less on average: Girod, "Efficiency
         Analysis of Multihypothesis Motion-Compensated Prediction for Video Coding" (2000).
         """
 
