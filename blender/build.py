@@ -50,7 +50,7 @@ def download(requirements: list[str], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for tags in PLATFORMS.values():
         for python in PYTHONS:
-            words = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+            words = [sys.executable, "-P", "-m", "pip", "download", "--quiet", "--no-deps"]
             words += ["--disable-pip-version-check", "--only-binary=:all:", "--dest", str(folder)]
             words += ["--python-version", python]
             words += [word for tag in tags for word in ("--platform", tag)]
@@ -109,7 +109,7 @@ def wheels_of(platform: str, folder: Path) -> list[Path]:
 
 def own_wheel(folder: Path) -> Path:
     """The wheel of wgmb as it is here."""
-    words = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    words = [sys.executable, "-P", "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"wgmb's wheel cannot be built: {done.stderr}")

@@ -68,7 +68,7 @@ def blurred(pattern: str, out: Path, *more: object) -> float:
     adopt()
     others = own_children()
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    line = [sys.executable, "-m", "wgmb", "blur", pattern, "-o", out / "o.####.exr", "-q"]
+    line = [sys.executable, "-P", "-m", "wgmb", "blur", pattern, "-o", out / "o.####.exr", "-q"]
     line += ["--vectors", "blender", *more]
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     subprocess.run(list(map(str, line)), check=True, env=env)

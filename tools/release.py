@@ -47,12 +47,12 @@ def notes(changelog: str, version: str) -> str:
 
 def try_installed() -> None:
     """Import wgmb, ask the command line, and blur; AssertionError or a failed call otherwise."""
-    program = [sys.executable, "-m", "wgmb"]
+    program = [sys.executable, "-P", "-m", "wgmb"]
     with tempfile.TemporaryDirectory() as folder:  # not the clone, whose wgmb would be imported
         said = run([*program, "--version"], folder)
         print(f"wgmb {said.strip()} with Python {sys.version.split()[0]}")
         run([*program, "blur", "--help"], folder)
-        found = run([sys.executable, "-c", ADAPTERS], folder)
+        found = run([sys.executable, "-P", "-c", ADAPTERS], folder)
         adapters = json.loads(found)
         print("adapters:", *(adapters or ["none"]), sep="\n  ")
         if not [name for name in adapters if "OpenGL" not in name]:

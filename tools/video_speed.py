@@ -57,7 +57,19 @@ def main() -> None:
 def compare(clip: Path, folder: Path, given: argparse.Namespace) -> None:
     """Time everything in turns."""
     exact, scratch = folder / "exact.mkv", folder / "scratch.mp4"
-    blur = ["-m", "wgmb", "blur", clip, "--flow", "none", "--shutter", "360", "--fps", given.fps]
+    blur = [
+        "-P",
+        "-m",
+        "wgmb",
+        "blur",
+        clip,
+        "--flow",
+        "none",
+        "--shutter",
+        "360",
+        "--fps",
+        given.fps,
+    ]
     blur += ["--overwrite", "--quiet", "-o"]
     me = Path(__file__)
     lines = {

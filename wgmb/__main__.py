@@ -1,8 +1,9 @@
 """The `wgmb` command, also `python -m wgmb`; handles Ctrl-C while modules are being loaded."""
 
 import os
-import signal
 import sys
+
+from . import interpreter
 
 
 def _leave(*_) -> None:
@@ -15,6 +16,9 @@ def _leave(*_) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
+    interpreter.leave_current_folder()
+    import signal  # the first module that is searched for
+
     signal.signal(signal.SIGINT, _leave)
     signal.signal(signal.SIGTERM, _leave)
     try:

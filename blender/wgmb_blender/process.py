@@ -84,7 +84,9 @@ class Process:
 
     def _started(self) -> subprocess.Popen[bytes]:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115
-        path = [*filter(None, sys.path), str(Path(__file__).parent)]
+        here = Path.cwd()  # where files of strangers may lie
+        path = [folder for folder in sys.path if folder and Path(folder).resolve() != here]
+        path.append(str(Path(__file__).parent))
         words = [sys.executable, "-I", "-c", _START, json.dumps(path)]
         try:
             return subprocess.Popen(

@@ -19,7 +19,7 @@ import OpenEXR
 WIDTH, HEIGHT = 64, 48
 VELOCITY = (4.0, 2.0)  # pixels per frame, y down
 MAX_DISPLACE = 16.0  # of the rsmb convention
-COMMAND = [sys.executable, "-m", "wgmb"]
+COMMAND = [sys.executable, "-P", "-m", "wgmb"]
 
 
 def texture(x, y, seed: float = 0.0) -> np.ndarray:

@@ -26,7 +26,7 @@ from typing import IO, Any
 
 from . import PATHS
 
-WGMB = [sys.executable, "-m", "wgmb"]
+WGMB = [sys.executable, "-P", "-m", "wgmb"]
 _LOOK = 0.02  # s
 _ENDS = "\nsoaking: "  # what a function returned follows, on stdout
 
@@ -144,7 +144,7 @@ def apart(work: Callable, *given, **options) -> Ended:
         json.dump(given, file)
         file.flush()
         folder = Path(inspect.getfile(work)).parent
-        line = [sys.executable, "-m", __name__, name, file.name, folder]
+        line = [sys.executable, "-P", "-m", __name__, name, file.name, folder]
         ended = run(line, **options)
     said, _, value = ended.out.rpartition(_ENDS)
     value = json.loads(value) if value and ended.code == 0 else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
+from .. import interpreter
 from ..color.srgb import linear
 from ..errors import Error, InputError
 from ..io import exr, stills
@@ -129,7 +129,8 @@ class Actions:
     def _start_export(self, output: str, state: State) -> None:
         words = state.command(output)
         child = subprocess.Popen(
-            [sys.executable, "-m", "wgmb", *words, "--quiet"],
+            interpreter.command("-m", "wgmb", *words, "--quiet"),
+            env=interpreter.environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,

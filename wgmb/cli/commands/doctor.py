@@ -7,11 +7,11 @@ import os
 import platform
 import re
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from ... import interpreter
 from ..._version import __version__
 from ...errors import DeviceError, Error
 from ...extras import (
@@ -123,11 +123,10 @@ def _import_faults(packages: list[str]) -> dict[str, str]:
     """
     faults, last = {}, time.monotonic() + _PATIENCE
     while packages:
-        # -P: a file of such a name in the current folder is not the package.
-        line = [sys.executable, "-P", "-c", _IMPORTS, *packages]
+        line, kept = interpreter.command("-c", _IMPORTS, *packages), interpreter.environment()
         patience = max(last - time.monotonic(), 1)
         try:
-            done = subprocess.run(line, capture_output=True, timeout=patience)
+            done = subprocess.run(line, capture_output=True, timeout=patience, env=kept)
             said, end = done.stdout, f"Python ends with code {done.returncode}"
         except subprocess.TimeoutExpired as error:
             said, end = error.stdout or b"", f"no end after {patience:.0f} s"

@@ -12,11 +12,12 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from ... import interpreter
 from ...errors import DeviceError
 
 _NEVER = "1 hour"
@@ -59,6 +60,7 @@ def local_client(count: int) -> Iterator[Any]:
     with (
         TemporaryDirectory(prefix="wgmb-", ignore_cleanup_errors=True) as folder,
         dask.config.set(settings),
+        _environment(),
     ):
         if method == "forkserver":
             _load_once()
@@ -100,6 +102,25 @@ def _load_once() -> None:
     from distributed.utils import get_mp_context
 
     get_mp_context().set_forkserver_preload(_LOADED_ONCE)
+
+
+@contextmanager
+def _environment() -> Iterator[None]:
+    """Meanwhile no Python that starts imports a module from the current folder."""
+    names = "PYTHONSAFEPATH", "PYTHONPATH"
+    before, wanted = dict(os.environ), interpreter.environment()
+    _set(names, wanted)
+    try:
+        yield
+    finally:
+        _set(names, before)
+
+
+def _set(names: Sequence[str], values: Mapping[str, str]) -> None:
+    for name in names:
+        os.environ.pop(name, None)
+        if name in values:
+            os.environ[name] = values[name]
 
 
 @contextmanager

@@ -1,0 +1,45 @@
+"""The Python that runs wgmb's commands, and every other one that it starts.
+
+None of them imports a module from the current folder, where files of strangers lie. This module
+imports what is there before a folder is searched, and nothing else.
+"""
+
+import os
+import sys
+
+_ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
+
+
+def command(*words: str) -> list[str]:
+    """The command line of another Python, which is started with `environment`."""
+    return [sys.executable, "-P", *words]
+
+
+def environment() -> dict[str, str]:
+    """This process's environment for another Python, and for those that it starts in turn."""
+    found = os.environ | {"PYTHONSAFEPATH": "1"}
+    folders = found.pop("PYTHONPATH", "").split(os.pathsep)
+    if kept := [folder for folder in folders if not _is_current(folder)]:
+        found["PYTHONPATH"] = os.pathsep.join(kept)
+    return found
+
+
+def leave_current_folder() -> None:
+    """Import nothing more from the current folder, here and in any other Python.
+
+    `python -m` puts it first on the path, and so does an empty entry of PYTHONPATH.
+    """
+    sys.path[:] = [folder for folder in sys.path if not _is_current(folder)]
+    kept = environment()
+    if "PYTHONPATH" not in kept:
+        os.environ.pop("PYTHONPATH", None)
+    os.environ.update(kept)
+
+
+def _is_current(folder: str) -> bool:
+    """Return True for the current folder, unless wgmb itself is installed there."""
+    try:
+        place = os.path.realpath(folder)  # of an empty name, the current folder
+        return place == os.path.realpath(os.curdir) != _ROOT
+    except OSError:  # it was removed
+        return not folder
