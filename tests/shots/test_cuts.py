@@ -15,8 +15,10 @@ from wgmb import (
     Reprojections,
 )
 from wgmb.cli import app
+from wgmb.color.srgb import linear
 from wgmb.io import stills
 from wgmb.shots.cuts import is_cut, jumps, pictures_differ
+from wgmb.shots.prediction import predicted
 
 
 @pytest.fixture
@@ -82,6 +84,49 @@ def test_cuts_are_told_from_motion_in_bands(size):
     a, b = whole[:height, :width], whole[2 : height + 2, 4 : width + 4]
     assert not pictures_differ(a, b)
     assert pictures_differ(a, np.ascontiguousarray(whole[::-1, ::-1][:height, :width]))
+
+
+def cells(side, seed=1):
+    """(460, 740, 3) display values of random cells."""
+    whole = np.random.default_rng(seed).random((-(-460 // side), -(-740 // side), 3), np.float32)
+    return whole.repeat(side, axis=0).repeat(side, axis=1)[:460, :740]
+
+
+def seen(whole, down=0, right=0):
+    """The part of it before a camera, in linear light."""
+    return linear(whole[50 + down : 410 + down, 50 + right : 690 + right])
+
+
+@pytest.mark.parametrize("side", [3, 5, 8])
+@pytest.mark.parametrize("way", [(3, 2), (-15, 9), (21, 33)])
+def test_fine_texture_before_a_hand_held_camera_is_no_cut(side, way):
+    here = seen(cells(side))
+    assert not pictures_differ(here, seen(cells(side), *way))
+    assert pictures_differ(here, seen(cells(side, seed=2), *way))
+
+
+def test_rain_is_no_cut():
+    def rain(picture, seed):
+        wet, rng = picture.copy(), np.random.default_rng(seed)
+        for y, x in zip(rng.integers(0, 420, 2200), rng.integers(0, 738, 2200), strict=True):
+            wet[y : y + 40, x : x + 3] += 0.3 * (1 - wet[y : y + 40, x : x + 3])
+        return seen(wet)
+
+    ground = 0.05 + 0.8 * cells(5)
+    for seed in range(1, 4):
+        assert not pictures_differ(rain(ground, seed), rain(ground, seed + 1))
+        assert pictures_differ(rain(ground, seed), rain(ground[::-1], seed + 1))
+
+
+def test_the_share_predicted_is_by_place():
+    """Half of a picture that is another one is not predicted, and nothing is where all is flat."""
+    here, other = (cells(5, seed)[:96, :96].mean(axis=2) for seed in (1, 2))
+    half = np.concatenate([here[:48], other[48:]])
+    assert predicted(here, here, 9) > 0.95
+    assert 0.4 < predicted(here, half, 9) < 0.65
+    assert predicted(here, 0.5 * here + 0.3, 9) > 0.95  # of another brightness and contrast
+    assert predicted(here, other, 9) < 0.2
+    assert predicted(np.full_like(here, 0.5), here, 9) == 0
 
 
 @pytest.mark.parametrize("side", [-1, 1])

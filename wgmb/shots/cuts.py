@@ -11,6 +11,7 @@ import numpy as np
 from ..color.srgb import srgb
 from ..extent import displacement
 from ..frame import Frame
+from .prediction import BLOCK, predicted
 
 _PROBES = 2000  # pixels looked at
 _CUT = (
@@ -21,7 +22,6 @@ _MOST = 0.5  # difference of tones beyond which a pixel has merely changed
 _JUMP = 8  # times the motion to the other side
 _FAR = 0.1  # of the picture's width
 _SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
-_BLOCK = 8  # pixels a side
 _SEARCH = 0.2  # of the width: farther nothing is looked for
 _STEP = 2  # pixels between places where a block is looked for
 SAMPLED = 480  # pixels of width that are compared to tell a copy
@@ -32,6 +32,8 @@ _UNLIKE = 0.78  # of the contrast
 _FADED = 0.6  # of the contrast, when one picture is as bright as the other
 _FADE = 0.125  # of display values: what a fade adds to the mean from one picture to the next
 _FADE_CONTRAST = 1.5  # times the contrast of the picture before
+_PREDICTED = 0.45  # of the textured blocks; where as many are found again, there is no cut
+_LUMA = np.array([0.25, 0.625, 0.125], np.float32)
 
 
 def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
@@ -44,7 +46,7 @@ def small_step(width: int, height: int) -> int:
 
     The copy is about 96 pixels wide; that of a band is at least two blocks high.
     """
-    return max(1, min(width // _SMALL, height // (2 * _BLOCK)))
+    return max(1, min(width // _SMALL, height // (2 * BLOCK)))
 
 
 def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
@@ -55,12 +57,15 @@ def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
     blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to 1.48 between unrelated
     pictures. A fade is no cut: its pictures are compared at equal brightness and contrast, where
     0.2 to 0.45 is left, and 0.73 to 2.3 of unrelated pictures.
+
+    Fine texture that moves by parts of a pixel, and rain, leave as much as a cut does; there is no
+    cut where nearly half of the textured blocks are found again, see prediction.py.
     """
     if a.shape != b.shape:
         return True
     if np.abs(a - b).mean() < _ALIKE:
         return False
-    if min(a.shape[:2]) < _BLOCK:
+    if min(a.shape[:2]) < BLOCK:
         return True
     if _follows(a, b, _UNLIKE, _ALIKE):
         return False
@@ -68,7 +73,9 @@ def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
     brighter = float(b.mean() - a.mean())
     if abs(brighter) > _FADE or not 1 / _FADE_CONTRAST <= contrast <= _FADE_CONTRAST:
         return True
-    return not _follows(a, (b - b.mean()) / contrast + a.mean(), _FADED, 0)
+    if _follows(a, (b - b.mean()) / contrast + a.mean(), _FADED, 0):
+        return False
+    return predicted(a @ _LUMA, b @ _LUMA, _reach(b)) < _PREDICTED
 
 
 def _follows(a: np.ndarray, b: np.ndarray, share: float, least: float) -> bool:
@@ -76,23 +83,28 @@ def _follows(a: np.ndarray, b: np.ndarray, share: float, least: float) -> bool:
 
     A contrast below `least` counts as that.
     """
-    height, width = (n // _BLOCK for n in a.shape[:2])
-    a = a[: height * _BLOCK, : width * _BLOCK]
+    height, width = (n // BLOCK for n in a.shape[:2])
+    a = a[: height * BLOCK, : width * BLOCK]
     blocks = _blocks(a)
     contrast = np.abs(blocks - blocks.mean(axis=(1, 3), keepdims=True)).sum(axis=4).mean()
     most = share * max(float(contrast), least)
-    reach = round(_SEARCH * min(b.shape[1], 2 * _SMALL) / _STEP) * _STEP
+    reach = round(_reach(b) / _STEP) * _STEP
     a = np.ascontiguousarray(np.moveaxis(a, 2, 0))  # planes: sums along rows are quick
     b = np.pad(np.moveaxis(b, 2, 0), ((0, 0), (reach, reach), (reach, reach)), mode="edge")
     left, apart = np.full((height, width), np.inf), np.empty_like(a)
     for y, x in _ways(min(reach, a.shape[1]), reach):
         there = b[:, reach + y : reach + y + a.shape[1], reach + x : reach + x + a.shape[2]]
         np.abs(np.subtract(a, there, out=apart), out=apart)
-        rows = apart.sum(axis=0).reshape(height, _BLOCK, -1).sum(axis=1)
-        left = np.minimum(left, rows.reshape(height, width, _BLOCK).sum(axis=2) / _BLOCK**2)
+        rows = apart.sum(axis=0).reshape(height, BLOCK, -1).sum(axis=1)
+        left = np.minimum(left, rows.reshape(height, width, BLOCK).sum(axis=2) / BLOCK**2)
         if left.mean() <= most:  # it can only become less
             return True
     return False
+
+
+def _reach(small: np.ndarray) -> int:
+    """Pixels up to which something is looked for along an axis."""
+    return round(_SEARCH * min(small.shape[1], 2 * _SMALL))
 
 
 @cache
@@ -111,15 +123,15 @@ def copies(a: np.ndarray, b: np.ndarray) -> bool:
     if a.shape != b.shape:
         return False
     off = np.abs(a.astype(np.float32) - b).max(axis=2)
-    height, width = (n // _BLOCK * _BLOCK for n in off.shape)
+    height, width = (n // BLOCK * BLOCK for n in off.shape)
     worst = _blocks(off[:height, :width]).mean(axis=(1, 3)).max() if height and width else off.max()
     return bool(off.mean() < _COPY and worst < _COPY_WORST)
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:
-    """(rows, _BLOCK, columns, _BLOCK, ...) of a plane whose sides are multiples of _BLOCK."""
-    height, width = (n // _BLOCK for n in plane.shape[:2])
-    return plane.reshape(height, _BLOCK, width, _BLOCK, *plane.shape[2:])
+    """(rows, BLOCK, columns, BLOCK, ...) of a plane whose sides are multiples of BLOCK."""
+    height, width = (n // BLOCK for n in plane.shape[:2])
+    return plane.reshape(height, BLOCK, width, BLOCK, *plane.shape[2:])
 
 
 def _small(color: np.ndarray) -> np.ndarray:
