@@ -1,10 +1,10 @@
 """The record that every result carries: settings, what was read, and a checksum of the file.
 
 A record is JSON and stands in the file as it is: in an EXR as the attribute `wgmb`, in a PNG as a
-text of that keyword, in a TIFF as its description, in a JPEG as its comment, in a video as its
-comment or another text that is free, in a GIF behind its end. It begins with the seal, the file's
-length in bytes and its CRC-32, both taken while the seal's digits are 0. A file whose seal holds is
-the whole file that was written, to the last bit.
+text of that keyword, in a TIFF as its description, in a JPEG as its comment, in a video in a block
+of its own, which players skip (see record_block.py). It begins with the seal, the
+file's length in bytes and its CRC-32, both taken while the seal's digits are 0. A file whose seal
+holds is the whole file that was written, to the last bit.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import re
 import zlib
 from pathlib import Path
 from typing import Any
+
+from . import record_block
 
 KEY = "wgmb"  # attribute or keyword of the record
 _BLANK = b"0" * 12 + b"-" + b"0" * 8  # length, CRC-32
@@ -56,7 +58,7 @@ def read(data: bytes | mmap.mmap) -> dict[str, Any] | None:
 
 def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict[str, Any], int] | None:
     """The content of the record that begins there, and its length [bytes]; None if it is broken."""
-    text = data[begin : begin + 65536].decode("latin-1")
+    text = record_block.text_at(data, begin, 65536).decode("latin-1")
     try:
         content, length = json.JSONDecoder().raw_decode(text)
     except (ValueError, RecursionError):
@@ -65,15 +67,18 @@ def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict[str, Any], int] |
     return content, length
 
 
-def seal_file(path: Path, text: str) -> None:
-    """Set the digits of the seal of a large file, in place; `text` is the record in it."""
+def put_into(path: Path, text: str, *, is_complete: bool = True) -> None:
+    """Put a record into a video, with its seal where the video `is_complete`.
+
+    OSError if the file cannot be written.
+    """
+    begin, end = record_block.append(path, text)
+    if not is_complete:
+        return
     with open(path, "r+b") as file:
         data = mmap.mmap(file.fileno(), 0)
-        at = data.find(text.encode())
-        if at < 0:
-            raise ValueError("the record is not in the file")
-        digits = _sealed(memoryview(data), at, at + len(text.encode()))[1]
-        begin = at + len(_BEGIN)
+        digits = _sealed(memoryview(data), begin, end)[1]
+        begin += len(_BEGIN)
         data[begin : begin + len(digits)] = digits
 
 

@@ -114,14 +114,14 @@ class Output:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)
                 names = display.names if display else frames.SRGB_DISPLAY
-                self._videos[view] = frames.FrameVideo(path, temporary, fps, "", names)
+                self._videos[view] = frames.FrameVideo(path, temporary, fps, display=names)
             self._settle({"fps": str(fps)})
 
     def _settle(self, more: dict[str, Any]) -> None:
         """Write `more` into the record of a video."""
         self.settings = json.dumps(json.loads(self.settings) | more, sort_keys=True)
         for video in self._videos.values():
-            video.text = record.blank(json.loads(self.settings))
+            video.record = record.blank(json.loads(self.settings))
 
     def is_finished(self, frames: Iterable[tuple[int, dict[str, Any]]]) -> bool:
         """Return True if this is a video that an earlier run made of the same (finished_videos.py).

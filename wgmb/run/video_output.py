@@ -30,7 +30,6 @@ from .report import Progress
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
 
 FIRST = 1  # number of the first frame, where they are image files
-_RECORD = "comment", "description", "synopsis"  # texts of a video; the first that is free
 
 
 class VideoSource(Protocol):
@@ -90,7 +89,6 @@ def _write_video(
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(reader.coding)
     made_of = settings | {"times": wanted.key}
-    texts = _texts(reader, made_of)
     there = [path] if os.path.exists(os.path.realpath(path)) else []
     refuse_inputs(path.parent, [path.name], there, inputs)
     if is_finished(path, made_of, resume=output.resume, overwrite=output.overwrite):
@@ -112,19 +110,14 @@ def _write_video(
             for numbers in segments.to_do():
                 part = source.frames(wanted[numbers.start : numbers.stop], coded)
                 run(part, VideoSink(segments.begin(numbers)), progress=progress)
-            return [*lost, *segments.join(texts, others)]
+            return [*lost, *segments.join(record.blank(made_of), others)]
         finally:
             segments.release()
-    writer = VideoWriter(path, atomic.temporary_name(path), form, texts, others, is_new=not there)
+    said, temporary = record.blank(made_of), atomic.temporary_name(path)
+    writer = VideoWriter(path, temporary, form, None, others, record=said, is_new=not there)
     run(source.frames(wanted, coded), VideoSink(writer), progress=progress)
     remove_left(path)
     return [*lost, *writer.left_out]
-
-
-def _texts(reader: VideoReader, made_of: dict[str, Any]) -> dict[str, str]:
-    """The record of a video, under the first text that its input leaves free."""
-    free = next((name for name in _RECORD if name not in reader.metadata), _RECORD[0])
-    return {free: record.blank(made_of)}
 
 
 def _made_of(source: VideoSource, masks: Sequence[Path]) -> dict[str, Any]:

@@ -88,7 +88,6 @@ class VideoReader:
             self._check_size(stream, max_mb)
             self.container = container.format.name
             self.codec = stream.codec_context.codec.canonical_name  # not that of the decoder
-            self.metadata = dict(container.metadata)
             self.chapters = len(container.chapters())
             self.streams = tuple(_described(s) for s in container.streams if s is not stream)
             self._tagged = tags_of(stream.codec_context)

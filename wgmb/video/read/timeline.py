@@ -288,7 +288,18 @@ def _hides_vp9(data: memoryview) -> bool:
     return not shows and data[-1] & 0xE0 != 0xC0  # the end of several frames in one packet
 
 
-_HIDES = {"vp8": _hides_vp8, "vp9": _hides_vp9}
+def _hides_gif(data: memoryview) -> bool:
+    """Return True for what follows the last picture, such as a comment (GIF89a, 24)."""
+    at = 0
+    while data[at : at + 1] == b"!":  # an extension, whose blocks tell their lengths
+        at += 2
+        while at < len(data) and data[at]:
+            at += 1 + data[at]
+        at += 1
+    return data[at : at + 1] != b"," and data[:3] != b"GIF"
+
+
+_HIDES = {"gif": _hides_gif, "vp8": _hides_vp8, "vp9": _hides_vp9}
 
 
 def _sorted(ticks: array[int]) -> np.ndarray:

@@ -17,42 +17,48 @@ from av.video.stream import VideoStream
 
 from ...color.coding import Coding
 from ...errors import InputError
-from ...io import atomic, record
+from ...io import atomic, record_block
+from ...io import record as records
 from .encoders import CONTAINERS, HARDWARE, Encoding
 from .format import VideoFormat
 from .scheduling import kept_scheduling
+from .texts import fitting
 
 _RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
 _FEW = 2  # frames: x265 states no decoding times for so few
-_NOT_KEPT = ("major_brand", "minor_version", "compatible_brands", "encoder")  # of another file
-_APPLE = "com.apple."
+# No checksum of the texts, which the seal changes; no random number as the file's name.
+_MATROSKA = {"write_crc32": "0", "fflags": "+bitexact"}
+_MUXING = {"matroska": _MATROSKA, "webm": _MATROSKA}
 
 
 class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
-    `metadata`: texts of the whole file. `is_new`, which may be set: no file of another process is
-    replaced. A text that is a record (see io/record.py) gets its seal if the file `is_complete`.
-    OSError, whose text names `path`, if it cannot be written.
+    `metadata`: texts of the whole file; what it cannot hold of them is in `left_out`. `record`:
+    see io/record.py; it gets its seal if the file `is_complete`. `is_new`, which may be set: no
+    file of another process is replaced. OSError, whose text names `path`, if it cannot be written.
     """
 
-    def __init__(self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str]):
+    def __init__(
+        self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str], record: str = ""
+    ):
         self.path, self.temporary = path, temporary
         self.is_new, self.is_complete = False, True
-        self._record = next(filter(record.is_begun, metadata.values()), "")
+        self._record = record
+        self._texts, options, self.left_out = fitting(suffix, metadata)
         self._container: OutputContainer | None = None
         self._lock: int | None = None
         try:
             self._lock = atomic.create(temporary)  # its own file, which nobody else writes to
             kind = CONTAINERS[suffix]
+            options = options | _MUXING.get(kind, {})
             self._container = av.open(
-                f"file:{temporary}", "w", format=kind, container_options=_muxing(kind, metadata)
+                f"file:{temporary}", "w", format=kind, container_options=options
             )
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise atomic.about(path, error) from None
-        texts = {k: v for k, v in metadata.items() if k not in _NOT_KEPT}
-        self._container.metadata.update(texts)
+        self._container.metadata.update(self._texts)
 
     @property
     def container(self) -> OutputContainer:
@@ -74,8 +80,7 @@ class NewFile:
             if self._container is not None:
                 self._container.close()
                 self._container = None
-            if self._record:
-                self._seal()
+            self._add_texts()
             if self._lock is not None:
                 os.fsync(self._lock)
             atomic.rename(self.temporary, self.path, is_new=self.is_new)
@@ -84,13 +89,13 @@ class NewFile:
             raise atomic.about(self.path, error) from None
         self._unlock()
 
-    def _seal(self) -> None:
-        """Complete the record in the file; what holds no texts gets it behind its end."""
+    def _add_texts(self) -> None:
+        """Put into the complete file what FFmpeg does not write: a GIF's comment, the record."""
         if self.path.suffix.lower() == ".gif":
-            with open(self.temporary, "ab") as file:
-                file.write(self._record.encode())
-        if self.is_complete:
-            record.seal_file(self.temporary, self._record)
+            for text in self._texts.values():
+                record_block.comment(self.temporary, text)
+        if self._record:
+            records.put_into(self.temporary, self._record, is_complete=self.is_complete)
 
     def _unlock(self) -> None:
         if self._lock is not None:
@@ -121,8 +126,9 @@ class VideoFile(NewFile):
         temporary: Path,
         format: VideoFormat,
         metadata: dict[str, str] | None = None,
+        record: str = "",
     ):
-        super().__init__(path, temporary, format.encoding.suffix, metadata or {})
+        super().__init__(path, temporary, format.encoding.suffix, metadata or {}, record)
         self._base, self._rate, self._packets = format.base, format.rate, 0
         self._late_times = format.encoding.encoder.name == "libx265"
         try:
@@ -187,16 +193,6 @@ def tag(on: av.VideoFrame | VideoCodecContext, coding: Coding) -> None:
     on.color_range = _RANGES[coding.full_range]
     on.colorspace, on.color_trc = coding.matrix, coding.transfer
     on.color_primaries = coding.primaries
-
-
-def _muxing(container: str, metadata: dict[str, str]) -> dict[str, str]:
-    """Options of the container."""
-    if container in ("mp4", "mov") and any(key.startswith(_APPLE) for key in metadata):
-        return {"movflags": "use_metadata_tags"}  # which hold the dates of Apple's cameras
-    if container in ("matroska", "webm"):
-        # No checksum of the texts, which the seal changes; no random number as the file's name.
-        return {"write_crc32": "0", "fflags": "+bitexact"}
-    return {}
 
 
 def _why(path: Path, encoding: Encoding, error: Exception) -> Exception:

@@ -44,9 +44,9 @@ class FrameVideo:
     Alpha is dropped (the colour is premultiplied, so it lies over black). Encoders that share
     colour between pixels may need even sizes: the last row or column is then repeated. A GIF has
     256 colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
-    the mean frame rate. `text`: its comment, which may be set until the first frame; one that is a
-    record (see io/record.py) gets a seal. `display`: names of the display's colour space, for the
-    tags. `encoding`: see encoders.chosen; by default that of the suffix.
+    the mean frame rate. `comment`: a text for players. `record`, which may be set until the first
+    frame: see io/record.py. `display`: names of the display's colour space, for the tags.
+    `encoding`: see encoders.chosen; by default that of the suffix.
     """
 
     def __init__(
@@ -54,11 +54,12 @@ class FrameVideo:
         path: Path,
         temporary: Path,
         fps: Fraction,
-        text: str,
+        comment: str = "",
         display: Collection[str] = SRGB_DISPLAY,
         encoding: Encoding | None = None,
     ):
-        self.path, self.temporary, self.text = path, temporary, text
+        self.path, self.temporary = path, temporary
+        self.record, self._texts = "", {"comment": comment}
         self._encoding = encoding or chosen(path)
         check_rate(path, fps, *(() if self._encoding.codec == "gif" else (_RATES,)))
         self.fps = fps.limit_denominator(FINEST_RATE)
@@ -82,8 +83,9 @@ class FrameVideo:
         if self._video is None:
             size = rgb.shape[1], rgb.shape[0]
             form = VideoFormat(self._encoding, self._coding, size, self.fps, 1 / self.fps)
-            texts = {"comment": self.text}
-            self._video = VideoWriter(self.path, self.temporary, form, texts)
+            self._video = VideoWriter(
+                self.path, self.temporary, form, self._texts, record=self.record
+            )
         self._video.add_rgb(rgb, self._frames / self.fps)
         self._frames += 1
 

@@ -87,16 +87,14 @@ class Segments:
         path.with_suffix(".json").unlink(missing_ok=True)  # of what it is going to replace
         return Segment(self, index, VideoWriter(path, atomic.temporary_name(path), self._format))
 
-    def join(
-        self, metadata: dict[str, str] | None = None, others: OtherStreams | None = None
-    ) -> list[str]:
+    def join(self, record: str = "", others: OtherStreams | None = None) -> list[str]:
         """Write the video, with `others` beside its pictures; return what is left out, in words.
 
-        InputError if a segment is missing or does not hold its pictures.
+        `record`: see io/record.py. InputError if a segment lacks or does not hold its pictures.
         """
-        texts = (metadata or {}) | (others.metadata if others else {})
+        texts = others.metadata if others else {}
         temporary = atomic.temporary_name(self.path)
-        file = NewFile(self.path, temporary, self._format.encoding.suffix, texts)
+        file = NewFile(self.path, temporary, self._format.encoding.suffix, texts, record)
         try:
             left_out = self._written(file, others)
             file.close()
@@ -110,7 +108,7 @@ class Segments:
         return left_out
 
     def _written(self, file: NewFile, others: OtherStreams | None) -> list[str]:
-        left_out = self._format.left_out
+        left_out = [*self._format.left_out, *file.left_out]
         orders = [self._display_order(self._file(n), r) for n, r in enumerate(self._ranges)]
         delay = max(min(o) + at - number for o in orders for at, number in enumerate(o))
         into: VideoStream | None = None

@@ -31,8 +31,8 @@ class VideoWriter:
     repeated (VideoFormat.padding). A GIF counts hundredths of a second, and has 256 colours a
     picture. OSError if the file cannot be written, InputError for an encoder
     that does not start. `others`: streams to put beside the pictures, with their texts and
-    dates; what of them the file cannot hold is in `left_out`. `is_new`: OSError, when it is
-    closed, where another process has made a file of this name meanwhile.
+    dates; what of them the file cannot hold is in `left_out`. `record`: see io/record.py. `is_new`:
+    OSError, when it is closed, where another process has made a file of this name meanwhile.
     """
 
     def __init__(
@@ -43,6 +43,7 @@ class VideoWriter:
         metadata: dict[str, str] | None = None,
         others: OtherStreams | None = None,
         *,
+        record: str = "",
         is_new: bool = False,
     ):
         if is_gif := format.encoding.codec == "gif":
@@ -54,8 +55,8 @@ class VideoWriter:
         self._by = VideoReformatter()
         self._palettes = Palettes(*format.padded) if is_gif else None
         texts = (metadata or {}) | (others.metadata if others else {})
-        self.left_out = format.left_out
-        self.file = VideoFile(path, temporary, format, texts)
+        self.file = VideoFile(path, temporary, format, texts, record)
+        self.left_out = [*format.left_out, *self.file.left_out]
         self.file.is_new = is_new
         try:
             if others is not None:
