@@ -29,6 +29,7 @@ from soaking import (
     names,
     numbers,
     resuming,
+    stated,
     stopping,
     strangers,
     videos,
@@ -39,7 +40,7 @@ from soaking.table import HEAD, ROWS, Row, run_rows, write_whole
 
 MODULES = (
     memory, viewing, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos,
-    footage, strangers,
+    footage, strangers, stated,
 )  # fmt: skip
 LISTED = [
     row for module in MODULES for row in ROWS.values() if row.run.__module__ == module.__name__

@@ -4,9 +4,11 @@ What is random follows from today's date, which a failure tells, with the comman
 the same again.
 """
 
+import contextlib
 import mmap
 import os
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -22,6 +24,7 @@ from soaking import (
     numbers,
     parts,
     resuming,
+    stated,
     stopping,
     strangers,
     table,
@@ -205,6 +208,41 @@ def test_how_a_command_ended_is_judged(code, err, wanted, wrong):
     found = Ended(code, "", err, 1.0, 1.0, False).wrong(*wanted, name="a.exr")
     assert found.startswith(wrong)
     assert bool(found) == bool(wrong)
+
+
+def behaved(how: str) -> list:
+    """The measurement of a command that behaves well or badly."""
+    from wgmb.cli import app
+
+    def main(words):
+        if how == "large":
+            kept = b"x" * (400 << 20)
+            time.sleep(len(kept))
+        while how == "long" or how == "deaf":
+            with contextlib.suppress(KeyboardInterrupt if how == "deaf" else ()):
+                sum(range(1000))
+        sys.stderr.write("wgmb: a.png: cut off\n")
+        return 2
+
+    stated.MOST_SECONDS, stated.DEAF_SECONDS, stated.MOST_MB = 0.5, 0.2, 300
+    app.main = main
+    return list(stated.measure([how], interrupt=0.1 if how == "deaf" else None))
+
+
+@pytest.mark.parametrize(
+    ("how", "wrong"),
+    [("well", ""), ("large", "over 300 MiB"), ("long", "over 0.5 s"), ("deaf", "deaf: 0.2 s")],
+)
+def test_a_command_that_takes_too_much_is_stopped(how, wrong):
+    measured = stated.Measured(*apart(behaved, how).value)
+    assert measured.ended.startswith(wrong)
+    assert stated.fault(measured, Path("a.png")).startswith(wrong)
+    assert (measured.exit, measured.line) == ((-9, "") if wrong else (2, "wgmb: a.png: cut off"))
+
+
+@pytest.mark.full
+def test_files_that_state_too_much_are_refused_or_read_rightly(tmp_path):
+    check(stated.stated, 4, tmp_path)
 
 
 def test_every_sound_file_is_read_and_seen_to_differ_from_others(tmp_path):

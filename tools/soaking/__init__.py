@@ -8,7 +8,8 @@ shots      frames on disk, and what an unbroken run makes of them
 parts      all that may draw a frame: every method and variant, scenes, the viewer
 
 memory, viewing, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos,
-footage, strangers: the rows
+footage, strangers, stated: the rows
+stated/stills: a sound file of each kind, and the numbers that it states
 """
 
 import sys
