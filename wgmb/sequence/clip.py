@@ -108,7 +108,7 @@ class Clip:
         self.builder = FrameBuilder(cache, self._finder, self.masks, self._cameras)
         self._neighbours = Neighbours(cache, self.builder, self._cut_list.is_search)
         if settled is not None:
-            self._neighbours.settle(settled.beyond)
+            self._neighbours.settle(settled.beyond, settled.is_joined)
             self.masks.take_names_as_found()
             self.notes |= {text: list(self.numbers) for text in settled.notes}
 
@@ -120,7 +120,7 @@ class Clip:
         """
         if self._settled is None:
             self.masks.check()
-            beyond = self._neighbours.beyond
+            beyond, is_joined = self._neighbours.beyond, self._neighbours.is_joined
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
             self._settled = SequenceFindings(
                 tuple(self.on_disk),
@@ -128,6 +128,7 @@ class Clip:
                 self._finder.finding,
                 tuple(sorted(self._known_cuts)),
                 beyond,
+                is_joined,
                 notes,
             )
             self._files.settle(self._settled)

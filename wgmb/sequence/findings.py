@@ -27,6 +27,8 @@ class SequenceFindings:
     """Frames that begin a shot, as the user or an edit says."""
     beyond: Sides
     """Sides of the data window beyond which the picture is unknown: left, top, right, bottom."""
+    is_joined: bool = False
+    """True if the left and the right edge seem to be one meridian of a panorama."""
     notes: tuple[str, ...] = ()
     """Messages for the user about all frames."""
 
@@ -39,6 +41,7 @@ class SequenceFindings:
             "finding": finding,
             "cuts": list(self.cuts),
             "beyond": list(self.beyond),
+            "is_joined": self.is_joined,
             "notes": list(self.notes),
         }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..shots.cuts import (
     still,
     straightened,
 )
+from . import panorama
 from .clip_frame import ClipFrame
 from .data_windows import (
     OUTSIDE,
@@ -48,6 +49,7 @@ class Neighbours:
 
     def __init__(self, stored: FrameCache, builder: FrameBuilder, is_search: bool):
         check_choice("outside", stored.passes.outside, OUTSIDE)
+        check_choice("`wrap`", stored.passes.wrap, panorama.WRAPS)
         self._stored, self._builder, self._is_search = stored, builder, is_search
         self._outside = stored.passes.outside
         self.cuts: set[int] = set()
@@ -59,6 +61,7 @@ class Neighbours:
         )
         self._jumps: dict[int, list[int]] = {}
         self._cuts_to: dict[tuple[int, int], bool] = {}
+        self._panoramas: set[tuple[int, str | None]] = set()
 
     def forget(self, number: int) -> None:
         """Drop what was made of a frame."""
@@ -76,15 +79,23 @@ class Neighbours:
         """Sides of the data window beyond which the picture is unknown."""
         return self._cut_through
 
-    def settle(self, beyond: Sides) -> None:
-        """Take what was found out about all frames as `beyond`."""
-        self._cut_through = beyond
+    @property
+    def is_joined(self) -> bool:
+        """True if the left and the right edge of these frames seem to be one meridian."""
+        return self._joined
+
+    def settle(self, beyond: Sides, is_joined: bool) -> None:
+        """Take what was found out about all frames as `beyond` and `is_joined`."""
+        self._cut_through, self._joined = beyond, is_joined
 
     # ---- frames ----------------------------------------------------------------------------
 
     def frame(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
         frame = self._builder.build(source, wanted)
+        if self._is_panorama(source, frame):
+            self._panoramas.add((source.number, source.view))
+            frame = panorama.shortest(frame)
         if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
@@ -98,9 +109,9 @@ class Neighbours:
     ) -> tuple[Frame, Placement]:
         """The frame by itself, on a canvas with room for `extent`."""
         frame = self.frame(source, wanted)
-        onto = self._canvas({0: (source, frame)}, extent)
-        frame = placed(frame, source.data_window, onto, self._edges(source, onto))
-        return frame, Placement(onto, self._bounds(source))
+        frames = {0: (source, frame)}
+        onto, wraps = self._canvas(frames, extent), self._wraps(frames)
+        return self._laid(onto, source, frame, wraps), Placement(onto, self._bounds(source))
 
     def between(
         self, source: FrameFile, wanted: frozenset[str], extent: Extent | None, reach: int
@@ -118,8 +129,8 @@ class Neighbours:
                 if found is None:
                     break
                 frames[offset] = found
-        onto = self._canvas(frames, extent)
-        made = {side: self._on(onto, *one) for side, one in frames.items()}
+        onto, wraps = self._canvas(frames, extent), self._wraps(frames)
+        made = {side: self._on(onto, *one, wraps) for side, one in frames.items()}
         beside: list[Frame | None] = []
         for side in (-1, 1):
             near, beyond = made.get(side), made.get(2 * side)
@@ -170,7 +181,7 @@ class Neighbours:
             self._alone[key] = source, wanted, frame
         return frame
 
-    def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
+    def _on(self, onto: Window, source: FrameFile, frame: Frame, wraps: bool = False) -> Frame:
         """`frame` on a canvas, made once while the canvas stays the same."""
         if source.data_window == onto:
             return frame
@@ -179,10 +190,15 @@ class Neighbours:
         if result is None or made is not frame or then != onto:
             self._placed.pop(key, None)
             self._make_room(self._placed)
-            edges = self._edges(source, onto)
-            result = placed(frame, source.data_window, onto, edges).locked()
+            result = self._laid(onto, source, frame, wraps).locked()
             self._placed[key] = frame, onto, result
         return result
+
+    def _laid(self, onto: Window, source: FrameFile, frame: Frame, wraps: bool) -> Frame:
+        """`frame` on a canvas; `wraps`: what lies beyond its sides is read around them."""
+        if wraps:
+            return panorama.placed(frame, source.data_window, onto)
+        return placed(frame, source.data_window, onto, self._edges(source, onto))
 
     def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
         while len(kept) >= (2 * self._stored.reach + 1) * max(len(self._stored.views), 1):
@@ -238,6 +254,11 @@ class Neighbours:
         source, _ = frames[0]
         display, windows = source.display_window, [file.data_window for file, _ in frames.values()]
         held = union(windows)
+        if self._wraps(frames):
+            if extent is None or extent.spread == "everywhere":
+                return display
+            boxes = [extent.box(frame, offset) for offset, (_, frame) in frames.items()]
+            return panorama.canvas(display, [box for box in boxes if box is not None])
         if extent is None or held == display == source.data_window:
             return held
         limit = allowed(windows, display, self._cut_through)
@@ -275,6 +296,57 @@ class Neighbours:
         )
         return left, top, right, bottom
 
+    # ---- panoramas -------------------------------------------------------------------------
+
+    def _is_panorama(self, source: FrameFile, frame: Frame) -> bool:
+        """True if the left and the right edge of a frame are one meridian; says so in a note."""
+        wrap = self._stored.passes.wrap
+        is_whole = source.data_window == source.display_window
+        if wrap == "on" and not is_whole:
+            raise InputError("wrap 'on' needs the whole panorama, and its data window is a part")
+        if wrap == "off" or not is_whole or (wrap == "auto" and frame.camera is not None):
+            return False
+        if wrap == "on":
+            return True
+        if panorama.is_stated(source):
+            reason = "its attribute envmap says so"
+        elif not panorama.has_shape(source):
+            return False
+        elif self._joined:
+            reason = "2:1, and its left edge goes on where the right one ends"
+        elif panorama.crosses(frame.motion):
+            reason = "2:1, and vectors are longer than half its width"
+        else:
+            return False
+        text = f"is taken as a panorama of 360 degrees ({reason}); `wrap='off'` takes it as flat"
+        if source.number not in (on := self._stored.notes.setdefault(text, [])):
+            on.append(source.number)
+        return True
+
+    def _wraps(self, frames: Mapping[int, tuple[FrameFile, Frame]]) -> bool:
+        """True if the frames, by their offset, are to be read around their edges."""
+        source, _ = frames[0]
+        is_whole = all(file.data_window == source.display_window for file, _ in frames.values())
+        return is_whole and (source.number, source.view) in self._panoramas
+
+    @cached_property
+    def _joined(self) -> bool:
+        """True if the edges of these frames join: the first, the middle and the last on disk."""
+        pictures = [source.rgba for source in self._some_leaders() if panorama.has_shape(source)]
+        return bool(pictures) and all(map(panorama.joins, pictures))
+
+    def _some_leaders(self) -> Iterator[FrameFile]:
+        """The first, the middle and the last frame on disk, as far as their pictures are readable.
+
+        Findings on these alone are independent of `frames`.
+        """
+        there = self._stored.files.on_disk
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                source = self._stored.leader(number)
+                _ = source.rgba
+                yield source
+
     @cached_property
     def _cut_through(self) -> Sides:
         """The sides at which data windows cut through the picture.
@@ -285,18 +357,14 @@ class Neighbours:
         if self._outside != "auto":
             edge = self._outside == "edge"
             return edge, edge, edge, edge
-        there = self._stored.files.on_disk
         places: list[set[int]] = [set(), set(), set(), set()]
         closed, within = [True] * 4, [True] * 4
-        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
-            try:
-                source = self._stored.leader(number)
-                rgba = source.rgba
-            except (InputError, OSError):  # its turn to fail comes
+        for source in self._some_leaders():
+            if not source.rgba.any():
                 continue
-            if not rgba.any():
-                continue
-            sides = zip(source.data_window, source.display_window, covered(rgba), strict=True)
+            sides = zip(
+                source.data_window, source.display_window, covered(source.rgba), strict=True
+            )
             for i, (end, border, full) in enumerate(sides):
                 places[i].add(end)
                 closed[i] &= full and end != border

@@ -51,6 +51,8 @@ class InputSettings:
     "Pattern of files with additional layers of the same frames; may be repeated."
     outside: Literal["auto", "nothing", "edge"] = "auto"
     "Surroundings of a cropped frame: nothing, or its edge repeated."
+    wrap: Literal["auto", "on", "off"] = "auto"
+    "Panoramas of 360 degrees: motion and blur go on around the left and right edge."
     cuts: str | None = None
     """Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 switches the
     detection off.
@@ -103,6 +105,7 @@ class InputSettings:
             scale=scale,
             also=self.also,
             outside=self.outside,
+            wrap=self.wrap,
         )
         clip = Clip(
             pattern,

@@ -25,6 +25,7 @@ from ...sequence.layers import names
 from ...settings.color import ColorSettings
 from ..exit_codes import DONE
 from ..options import Colors, InputOptions, Inputs
+from ..spelling import as_options
 from ..terminal import note, out
 
 _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
@@ -102,7 +103,7 @@ def describe(
     for layer, members in names.layers(source.channels).items():
         kinds = [f"{names.component(m).upper()} {source.channels[m].dtype}" for m in members]
         lines.append(("layer", f"{layer or '(picture)'}: {', '.join(kinds)}"))
-    lines += [("note", text) for text, on in clip.notes.items() if source.number in on]
+    beginning = len(lines)
     color = (
         ", ".join(dict.fromkeys(filter(None, source.color)))
         if source.reference_channel
@@ -119,7 +120,9 @@ def describe(
     lines.append(("light", clip.light_passes(source).text))
     if valid := clip.vector_mask(source):
         lines.append(("valid", f"vectors are used where {valid} is 1"))
-    return lines + _about_motion(clip, source, output)
+    lines += _about_motion(clip, source, output)
+    notes = [("note", as_options(text)) for text, on in clip.notes.items() if source.number in on]
+    return [*lines[:beginning], *notes, *lines[beginning:]]
 
 
 def _views_text(clip: Clip, source: FrameFile) -> str:

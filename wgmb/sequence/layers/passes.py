@@ -26,7 +26,9 @@ class Passes:
     same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth from
     which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
     display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
-    (unknown if the window cuts through the picture).
+    (unknown if the window cuts through the picture). `wrap`: the left and the right edge are one
+    meridian of an equirectangular panorama: "on", "off" or "auto" (by the attribute `envmap`, or
+    where a picture is 2:1 and its edges join or vectors are longer than half its width).
     """
 
     color: str | None = None
@@ -41,6 +43,7 @@ class Passes:
     scale: str | tuple[str, ...] = ()
     also: tuple[str, ...] = ()
     outside: str = "auto"
+    wrap: str = "auto"
 
     @property
     def layers(self) -> tuple[str, ...]:
