@@ -1,6 +1,7 @@
 """The times of a video are read as they are, and its rate is told by them."""
 
 import struct
+from array import array
 from fractions import Fraction
 
 import av
@@ -9,7 +10,10 @@ import pytest
 from av.sidedata.sidedata import Type
 
 import make_clips as clips
+from wgmb.settings.video import VideoSettings
+from wgmb.video.output_times import OutputFrames
 from wgmb.video.read.decoder import decoded
+from wgmb.video.read.packets import completed
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Timeline, Times
 
@@ -195,3 +199,95 @@ def test_pictures_from_the_middle_are_those_of_a_whole_pass(tmp_path, kind, g):
             for a, b in zip(picture.planes, whole[number].planes, strict=True):
                 assert np.array_equal(a, b), number
     assert reader.loss() == ""
+
+
+def raw(path, kind, codec, rate, **more):
+    """24 frames as packets alone, without a container."""
+    size = (176, 144)
+    pixels = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+    frames = [clips.frame(clips.planes(n, size), pixels) for n in range(24)]
+    rate = Fraction(rate)
+    return clips.write(path, frames, codec=codec, pixels=pixels, kind=kind, rate=rate, **more)
+
+
+@pytest.mark.parametrize("rate", ["24000/1001", "12", "25", "60"])
+@pytest.mark.parametrize(
+    ("kind", "codec"),
+    [("h264", "libx264"), ("hevc", "libx265"), ("mpeg2video", "mpeg2video"), ("ivf", "libsvtav1")],
+)
+def test_pictures_without_a_container_have_the_rate_of_their_header(tmp_path, kind, codec, rate):
+    reader = VideoReader(raw(tmp_path / "c.bin", kind, codec, rate, tick=1 / Fraction(rate)))
+    assert reader.rate == Fraction(rate)
+    assert list(reader.times) == [reader.times[0] + n / Fraction(rate) for n in range(24)]
+    assert reader.until - reader.times[0] == 24 / Fraction(rate)
+    assert not any("assumed" in note and "a second" in note for note in reader.notes)
+
+
+def test_raw_h263_has_one_rate(tmp_path):
+    """FFmpeg makes the first step before it knows the rate."""
+    reader = VideoReader(raw(tmp_path / "c.h263", "h263", "h263", "25", tick=Fraction(1, 25)))
+    assert reader.rate == Fraction(30000, 1001)
+    assert not reader.is_variable
+
+
+@pytest.mark.parametrize(
+    ("kind", "codec", "options"),
+    [("hevc", "libx265", {"x265-params": "log-level=none:vui-timing-info=0"}),
+     ("obu", "libsvtav1", None), ("mjpeg", "mjpeg", None)],
+)  # fmt: skip
+def test_a_rate_that_no_header_states_is_assumed_and_said(tmp_path, kind, codec, options):
+    reader = VideoReader(raw(tmp_path / "c.bin", kind, codec, "60", options=options))
+    assert reader.rate == 25
+    said = "does not say when its pictures are shown: 25 a second assumed"
+    assert said in reader.notes
+
+
+def test_a_cut_by_stream_copy_keeps_the_times_that_are_there(tmp_path):
+    """FFmpeg's reader of Matroska gives no times below zero."""
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(40)]
+    times = [Fraction(n - 13, 60) for n in range(40)]
+    options = {"bf": "3", "qp": "0", "b_strategy": "0", "g": "99"}
+    path = clips.write(tmp_path / "c.mkv", frames, times, rate=Fraction(60), options=options,
+                       muxing={"avoid_negative_ts": "disabled"})  # fmt: skip
+    with av.open(str(path)) as container:
+        assert sum(p.pts is None for p in container.demux(video=0) if p.size) == 13
+    reader = VideoReader(path)
+    assert [float(t) for t in reader.times] == pytest.approx([float(t) for t in times], abs=1e-3)
+    assert reader.rate == 60
+    assert not any("assumed" in note and "a second" in note for note in reader.notes)
+    assert shown(reader) == list(range(40))
+    assert shown(reader, 20, 25) == list(range(20, 26))
+
+
+def test_times_that_are_missing_fill_the_gaps():
+    """An even count of pictures in a gap; then those at the end."""
+
+    class Found:
+        untimed, count = array("q", [3, 4, 8]), 9
+
+    shown = np.array([0, 100, 200, 500, 600, 700], np.int64)
+    assert list(completed(shown, Found(), 100.0)) == [100 * n for n in range(9)]
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mov"])
+def test_the_last_picture_of_a_screen_recording_lasts_as_the_file_says(tmp_path, suffix):
+    times = [Fraction(n, 60) for n in (0, 1, 3, 4, 7, 30, 31, 40)]
+    path = tmp_path / f"c{suffix}"
+    with av.open(str(path), "w") as out:
+        stream = out.add_stream("libx264", rate=60, options={"bf": "0", "qp": "0"})
+        stream.width, stream.height, stream.pix_fmt = clips.WIDTH, clips.HEIGHT, "yuv420p"
+        stream.codec_context.time_base = clips.TICK
+        packets = []
+        for n, time in enumerate(times):
+            frame = clips.frame(clips.planes(n), "yuv420p")
+            frame.pts, frame.time_base = round(time / clips.TICK), clips.TICK
+            packets += stream.encode(frame)
+        packets += stream.encode(None)
+        packets[-1].duration = round(Fraction(3, 2) / packets[-1].time_base)
+        out.mux(packets)
+    reader = VideoReader(path)
+    assert float(reader.duration) == pytest.approx(40 / 60 + 1.5, abs=1e-3)
+    clock = VideoSettings().clock(reader, None)
+    assert len(OutputFrames(reader, clock, Fraction(60))) == 130
+    own = OutputFrames(reader, clock, None)
+    assert len(own) == 9 and own[8].time + 1 / reader.rate == pytest.approx(reader.until)

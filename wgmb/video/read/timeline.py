@@ -11,14 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 from av.container import InputContainer
 from av.error import FFmpegError
-from av.packet import Packet
+from av.format import Flags
 from av.stream import Disposition
 from av.video.stream import VideoStream
+
+from .packets import PictureTimes, completed
 
 KNOWN_RATES = tuple(
     Fraction(rate)
@@ -35,7 +37,6 @@ _STATED = 1e-4  # the same of a rate that the file states
 _UNEVEN = 0.02  # of a step: more is a variable rate
 _JITTER = 0.25  # of a step: less is a rate all the same
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
-_HOLDS = ("gif", "apng")  # elsewhere the last packet's duration is often that of any other rate
 _FINEST = 1_001_000  # denominator of a rate
 
 
@@ -73,7 +74,7 @@ class Timeline:
     in_order: bool
     """Decoded pictures are to be counted: their own times are not those in `times`."""
     is_assumed: bool
-    """The file does not say when its pictures are shown: the rate is a guess."""
+    """Neither the file nor its codec says when its pictures are shown: the rate is a guess."""
     end: Fraction
     """End of the last packet of any stream [s]."""
     problem: str
@@ -85,7 +86,7 @@ class Timeline:
     stated: Fraction | None = None
     """The known rate that the file states."""
     lasts: Fraction = Fraction(0)
-    """Duration of the last picture [s] in formats that state it for each; else 0."""
+    """Duration of the last picture [s] where the file states that of each; else 0."""
     counted: Timeline | None = None
     """The timeline for decoded pictures that do not come in the order of their times; the times are
     then those of decoding, and pictures are counted. None if that is impossible."""
@@ -186,7 +187,7 @@ class Timeline:
 def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     """Read all packets of a file; the Timeline of one of its streams."""
     base = stream.time_base or Fraction(1, 90000)
-    found = _Packets(stream.codec_context.name)
+    found = PictureTimes(stream.codec_context.name)
     wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
     ends: dict[int, int] = {}
     problem = ""
@@ -202,30 +203,75 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     except FFmpegError as error:
         problem = str(error.strerror or error)
     end = max((n * (container.streams[i].time_base or base) for i, n in ends.items()), default=base)
-    in_order, is_assumed = False, False
-    shown = found.presented
-    if len(shown) < found.count:
-        in_order, shown = True, found.decoded
-    elif container.format.name == "avi" and stream.codec_context.has_b_frames:
-        in_order = True  # it has times of decoding only
-    if len(shown) < found.count:
-        is_assumed, shown = True, array("q", range(found.count))
-        base = 1 / (stream.guessed_rate or stream.average_rate or Fraction(25))
-    timeline = Timeline(
-        Times(_sorted(shown), base), _sorted(found.keys), in_order, is_assumed, end, problem
-    )
+    times, in_order, is_assumed = _picture_times(container, stream, found)
+    timeline = Timeline(times, _sorted(found.keys), in_order, is_assumed, end, problem)
+    is_raw = _is_raw(container)
     timeline = replace(
         timeline,
         lacks=_lacking(container, stream, timeline, found.read),
         is_encrypted=found.is_encrypted,
-        stated=known_rate(stream.average_rate),
-        lasts=found.lasts * base if container.format.name in _HOLDS else Fraction(0),
+        stated=None if is_raw else known_rate(stream.average_rate),
+        lasts=_lasting(stream, found, timeline),
         goes_back=None if is_assumed else _going_back(found.decoded, base),
     )
     if in_order:
         return timeline
     counted = _counted(timeline, found, bool(stream.codec_context.has_b_frames))
-    return replace(timeline, counted=counted, repeated=_repeated(shown))
+    return replace(timeline, counted=counted, repeated=_repeated(found.presented))
+
+
+def _picture_times(
+    container: InputContainer, stream: VideoStream, packets: PictureTimes
+) -> tuple[Times, bool, bool]:
+    """The times of the pictures; whether they are to be counted; whether their rate is a guess.
+
+    A format without times has the rate in the header of its codec, or FFmpeg takes 25.
+    """
+    base, context = stream.time_base or Fraction(1, 90000), stream.codec_context
+    count, shown = packets.count, _sorted(packets.presented)
+    is_raw = _is_raw(container)
+    is_guess = is_raw and not context.framerate
+    if is_raw and count > 1 and (not len(shown) or _keeps_count(shown, count)):
+        begin, step = (
+            (shown[0], int(np.median(np.diff(shown)))) if len(shown) else (0, packets.step)
+        )
+        if step:
+            return Times(begin + step * np.arange(count), base), not len(shown), is_guess
+    if len(packets.presented) == count:
+        has_order = container.format.name == "avi" and context.has_b_frames
+        return Times(shown, base), bool(has_order), is_guess  # of decoding only, in an AVI
+    if len(packets.decoded) == count:
+        return Times(_sorted(packets.decoded), base), True, is_guess
+    rate = stream.guessed_rate or stream.average_rate or Fraction(25)
+    if len(shown) > 1:
+        stated = known_rate(stream.average_rate)
+        there = Timeline(Times(shown, base), shown, False, False, base, "", stated=stated)
+        step = float(1 / (there.rate * base))
+        return Times(completed(shown, packets, step), base), False, False
+    return Times(np.arange(count), 1 / rate), True, True
+
+
+def _is_raw(container: InputContainer) -> bool:
+    """Return True for a format that holds packets alone, without times."""
+    return bool(container.format.flags & Flags.no_timestamps.value)
+
+
+def _keeps_count(ticks: np.ndarray, count: int) -> bool:
+    """Return True for times that FFmpeg counted: their steps are the same, but for the first one,
+    which it makes before it knows the rate."""
+    return len(ticks) == count > 2 and len(np.unique(np.diff(ticks)[1:])) == 1
+
+
+def _lasting(stream: VideoStream, packets: PictureTimes, timeline: Timeline) -> Fraction:
+    """See Timeline.lasts. Durations that are all alike are those of a rate, perhaps another one."""
+    base = stream.time_base
+    if base is None or timeline.times.base != base or not packets.are_of_each:
+        return Fraction(0)
+    lasts, last = packets.lasts, int(timeline.times.ticks[-1])
+    if stream.duration is not None and stream.start_time is not None:
+        until = stream.start_time + stream.duration  # by the edit list, of an MP4
+        lasts = min(lasts, until - last) if until > last else lasts
+    return lasts * base
 
 
 def known_rate(rate: Fraction | None) -> Fraction | None:
@@ -234,7 +280,7 @@ def known_rate(rate: Fraction | None) -> Fraction | None:
     return next(near, None)
 
 
-def _counted(timeline: Timeline, packets: _Packets, reorders: bool) -> Timeline | None:
+def _counted(timeline: Timeline, packets: PictureTimes, reorders: bool) -> Timeline | None:
     """See Timeline.counted."""
     times = timeline.times
     if len(times) < packets.count:  # times that repeat: some pictures have that of decoding instead
@@ -245,61 +291,6 @@ def _counted(timeline: Timeline, packets: _Packets, reorders: bool) -> Timeline 
             timeline, in_order=True, times=Times(decoded - decoded[0] + times.ticks[0], times.base)
         )
     return replace(timeline, in_order=True) if packets.ascends and reorders else None
-
-
-class _Packets:
-    """Facts in the packets of a stream of pictures."""
-
-    def __init__(self, codec: str):
-        self.presented, self.decoded, self.keys = array("q"), array("q"), array("q")
-        self.lasts = 0  # ticks for which the last one is shown
-        self.count = self.read = 0  # of pictures that are shown, of packets
-        self.ascends = True  # the time at which each is shown
-        self.is_encrypted = False
-        self._hides = _HIDES.get(codec)
-
-    def add(self, packet: Packet[Any]) -> None:
-        """Take note of a packet, unless an edit list leaves it out, or it shows nothing."""
-        if not self.read:
-            self.is_encrypted = packet.has_sidedata("encryption_info")
-        self.read += 1
-        if packet.is_discard or (self._hides is not None and self._hides(memoryview(packet))):
-            return
-        self.count += 1
-        if packet.pts is not None:
-            self.ascends = self.ascends and (not self.presented or packet.pts >= self.presented[-1])
-            self.presented.append(packet.pts)
-            self.lasts = packet.duration or 0
-            if packet.is_keyframe:
-                self.keys.append(packet.pts)
-        if packet.dts is not None:
-            self.decoded.append(packet.dts)
-
-
-def _hides_vp8(data: memoryview) -> bool:
-    """Return True for a frame that only others build on (RFC 6386, section 9.1)."""
-    return not data[0] >> 4 & 1
-
-
-def _hides_vp9(data: memoryview) -> bool:
-    """Return True for such a frame (VP9 bitstream specification, 6.2), if it is alone."""
-    bits = data[0] << (1 if data[0] >> 4 & 3 == 3 else 0)  # profile 3 has one bit more
-    shows = bits >> 3 & 1 or bits >> 1 & 1
-    return not shows and data[-1] & 0xE0 != 0xC0  # the end of several frames in one packet
-
-
-def _hides_gif(data: memoryview) -> bool:
-    """Return True for what follows the last picture, such as a comment (GIF89a, 24)."""
-    at = 0
-    while data[at : at + 1] == b"!":  # an extension, whose blocks tell their lengths
-        at += 2
-        while at < len(data) and data[at]:
-            at += 1 + data[at]
-        at += 1
-    return data[at : at + 1] != b"," and data[:3] != b"GIF"
-
-
-_HIDES = {"gif": _hides_gif, "vp8": _hides_vp8, "vp9": _hides_vp9}
 
 
 def _sorted(ticks: array[int]) -> np.ndarray:
