@@ -56,6 +56,9 @@ class Extent:
             turns = np.clip(np.nan_to_num(-velocity / (2 * acceleration)), opens, closes)
         ways = [velocity * t + acceleration * t**2 for t in (opens, closes, turns)]
         spare = self.bend * np.abs(acceleration)
+        if self.spread == "nowhere":  # what such a method reads: see wgsl/common/backwards.wgsl
+            length = np.hypot(*velocity.T)[:, None]
+            spare = spare + length * max(opens * opens, closes * closes)
         least, most = np.min(ways, axis=0) - spare, np.max(ways, axis=0) + spare
         if self.spread == "around":
             far = np.hypot(*np.maximum(-least, most).T)[:, None]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from twins.tap import bilinear, displacement
+from twins.tap import bilinear, displacement, source
 
 MIN_SLOPE, MIN_COSINE = 2e-5, 1e-3
 
@@ -46,10 +46,14 @@ def fusion(color, motion, depth, times, middle, alphas, *, span=None, delay=(0.0
                 blur_length = min(1.0, max(np.linalg.norm(a - b) for a in ends for b in ends))
                 sharp, each = sharp + each.sum() * (1 - blur_length), each * blur_length
             here = np.array([x + 0.5, y + 0.5])
-            at = here + displacement(path, -(middle + late))
+
+            def moved(t, x=x, y=y, path=path):
+                return displacement(path, -t) if span is None else source(motion, y, x, t)
+
+            at = here + moved(middle + late)
             total = sharp * bilinear(color, *at)
             counted = sharp * (1.0 if weight is None else bilinear(weight, *at))
-            places = here + displacement(path, -(np.reshape(times, (-1, 1)) + late))
+            places = here + moved(np.reshape(times, (-1, 1)) + late)
             for at, share in zip(places, each, strict=True):
                 total = total + share * bilinear(soft, *at)
                 counted += share * (1.0 if weight is None else bilinear(soft_weight, *at))

@@ -13,6 +13,26 @@ def displacement(motion, t):
     return to_prev * (t * (t - 1) / 2) + to_next * (t * (t + 1) / 2)
 
 
+def source(motion, y, x, t):
+    """The way to what a pixel shows at time t, or a column of t: -v t + (J v - a) t^2."""
+    back, ahead = motion[y, x].astype(float).reshape(2, 2)
+    v, a = (ahead - back) / 2, (ahead + back) / 2
+    return -v * t + (change_along(motion, y, x, v) - a) * t**2
+
+
+def change_along(motion, y, x, v):
+    """Of the velocity along itself, from a quarter interval either way; at most the velocity."""
+    height, width = motion.shape[:2]
+
+    def velocity(at):
+        column, row = np.clip(np.floor(at), 0, (width - 1, height - 1)).astype(int)
+        return (motion[row, column, 2:] - motion[row, column, :2]) / 2
+
+    here = np.array([x, y]) + 0.5
+    change = 2 * (velocity(here + v / 4) - velocity(here - v / 4))
+    return change * min(1.0, np.linalg.norm(v) / max(np.linalg.norm(change), 1e-6))
+
+
 def bilinear(image, x, y):
     """The image at a position in pixels, centres at + 0.5, edges repeated."""
     height, width = image.shape[:2]
@@ -43,12 +63,12 @@ def tap(color, motion, times, delay=(0.0, 0.0), curved=True, weight=None):
 
 def pixel(color, motion, x, y, times, curved=True, weight=None):
     """One pixel of `tap`."""
-    path = motion[y, x].astype(float)
+    t = np.reshape(times, (-1, 1))
+    moved = source(motion, y, x, t)
     if not curved:
-        mean = (path[2:] - path[:2]) / 2
-        path = np.concatenate([-mean, mean])
+        moved = (motion[y, x, :2].astype(float) - motion[y, x, 2:]) / 2 * t
     total, counted = 0.0, 0.0
-    places = np.array([x + 0.5, y + 0.5]) + displacement(path, -np.reshape(times, (-1, 1)))
+    places = np.array([x + 0.5, y + 0.5]) + moved
     for at in places:
         total = total + bilinear(color, *at)
         counted += 1.0 if weight is None else bilinear(weight, *at)
@@ -79,7 +99,9 @@ def through_five(frames, times):
     for y, x in np.ndindex(z.shape):
         back, ahead = motion[y, x, :2], motion[y, x, 2:]
         bent = np.float16(bend(motion[y, x], z[y, x], y, x, at.get(-1), at.get(1)))
-        path = np.concatenate([(ahead - back) / 2, (ahead + back) / 2, bent])
+        v, a = (ahead - back) / 2, (ahead + back) / 2
+        half = -a if bent[2] > 0 else change_along(motion, y, x, v) - a
+        path = np.concatenate([-v, half, -bent[:2], bent[2:]])
         for t in times:
-            out[y, x] += bilinear(color, *(np.array([x, y]) + 0.5 + moved(path, -t))) / len(times)
+            out[y, x] += bilinear(color, *(np.array([x, y]) + 0.5 + moved(path, t))) / len(times)
     return out

@@ -1,9 +1,9 @@
 // A trail of samples along the motion, filtered, and fused with the sharp image by which way a surface faces (Chen 2016).
+//#include common/backwards.wgsl
 //#include common/facing.wgsl
 //#include common/finite.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
-//#include common/path.wgsl
 //#include common/shutter.wgsl
 
 struct Fusion {
@@ -60,8 +60,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let backwards = Trajectory(-trajectory.velocity * texel, trajectory.half_acceleration * texel);    // in time, in uv
-    let here = uv + displacement(backwards, middle);
+    var source = Trajectory(-trajectory.velocity, vec2f(0.0));
+    if !PUBLISHED { source = backwards(trajectory, x); }
+    let here = uv + texel * displacement(source, middle);
     var sum = weights.x * textureSampleLevel(color, linear, here, 0.0);
     var total = 0.0;
     if WEIGHTED { total = weights.x * textureSampleLevel(weight, linear, here, 0.0).x; }
@@ -69,7 +70,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 1u; i <= count; i++) {     // the newest first
         var t = shutter_time(times, frame.samples - i);
         if PUBLISHED { t = -0.5 * f32(i - 1u) / f32(frame.samples); }
-        let at = uv + displacement(backwards, t);
+        let at = uv + texel * displacement(source, t);
         sum += share * textureSampleLevel(soft, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(soft_weight, linear, at, 0.0).x; }
         share *= fusion.fading;

@@ -1,5 +1,5 @@
 // The mean colour along each pixel's own trajectory (Rosado 2007, GPU Gems 3, chapter 27).
-//#include common/trajectory5.wgsl
+//#include common/backwards.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
 //#include common/shutter.wgsl
@@ -40,21 +40,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let share = 1.0 / f32(times.count);     // applied before adding, so that no sum of finite colours overflows
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
-    let backwards = Trajectory(-trajectory.velocity * texel, trajectory.half_acceleration * texel);    // in time, in uv
-    var bent = trajectory5_from(backwards);
+    var source = Trajectory(-trajectory.velocity, vec2f(0.0));
+    if CURVED && !PUBLISHED { source = backwards(trajectory, x); }
+    var bent = trajectory5_from(source);
     if FIVE_POSITIONS {
-        let told = trajectory_with(vec4f(0.0), textureLoad(bends, id.xy, 0).x);
-        bent.third = -told.third * texel;
-        bent.has_kink = told.has_kink;
+        let told = trajectory_with(textureLoad(motion, id.xy, 0), textureLoad(bends, id.xy, 0).x);
+        bent = backwards5(told, x);
     }
     var sum = vec4f(0.0);
     var total = 0.0;
     for (var i = 0u; i < count; i++) {
         var t = shutter_time(times, i);
         if PUBLISHED { t = -0.5 * f32(i) * share; }
-        var moved = displacement(backwards, t);
+        var moved = displacement(source, t);
         if FIVE_POSITIONS { moved = displacement5(bent, t); }
-        let at = uv + moved;
+        let at = uv + texel * moved;
         sum += share * textureSampleLevel(color, linear, at, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, at, 0.0).x; }
     }
