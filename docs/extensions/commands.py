@@ -92,6 +92,8 @@ def _kind(argument) -> str:
     kinds = [_KINDS[kind] for kind in dict.fromkeys(inner) if kind in _KINDS]
     if str(hint).startswith("tuple[float, float]"):
         return "X X"
+    if tuple[float, float] in inner:
+        return "X|X,Y"
     return "|".join((*choices, *(kind for kind in kinds if kind)))
 
 

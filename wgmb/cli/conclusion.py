@@ -33,7 +33,7 @@ def conclude(report: BatchReport, target: Path, took: str, quiet: bool, verbose:
             what = ", ".join(f"{n} in {name}" for name, n in bad.items())
             note(f"frame {number}: ignored pixels that are not finite: {what}")
         if verbose or report.is_finding_notable:
-            note(f"vectors: {report.finding}")
+            note(f"vectors: {as_options(report.finding)}")
         for text, told in report.notes.items():
             if told:
                 text = as_options(text)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeVar, get_type_hints
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from ..io import exr
 from ..io.suffixes import STILLS, VIDEOS
@@ -141,6 +141,16 @@ class ShutterOptions(ShutterSettings):
     ] = None
 
 
+def _one_or_two(_: object, tokens: Sequence[Token]) -> float | tuple[float, float]:
+    """A number, or two with a comma between them."""
+    match [float(part) for part in tokens[0].value.split(",")]:
+        case [both]:
+            return both
+        case [x, y]:
+            return x, y
+    raise ValueError("must be a number, or two such as 1920,1080")
+
+
 @dataclass(frozen=True, kw_only=True)
 @_main("frames", "vectors")
 class InputOptions(InputSettings):
@@ -153,6 +163,14 @@ class InputOptions(InputSettings):
             f"{', '.join(CONVENTIONS)}."
         ),
     ] = "auto"
+    vector_scale: Annotated[
+        float | tuple[float, float],
+        Parameter(
+            help="Factor applied to the motion vectors, or X,Y: one for x and one for y.",
+            converter=_one_or_two,
+            n_tokens=1,
+        ),
+    ] = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

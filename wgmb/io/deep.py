@@ -7,6 +7,7 @@ a point at its front. OpenEXR, "Interpreting OpenEXR Deep Pixels".
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
@@ -80,7 +81,7 @@ def _is_color(name: str, data_layers: Collection[str]) -> bool:
     if (
         component.lower() not in _COLORS
         or own in _NOT_COLORS
-        or own in data_layers
+        or re.sub(r"[\W_]", "", own) in data_layers
         or own[-2:].isdigit()
     ):
         return False

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,6 +57,33 @@ def frame_path(pattern: str | Path, number: int) -> Path:
     """The file of frame `number`; a path that is no pattern stands for itself."""
     parsed = _parsed(pattern)
     return Path(pattern) if parsed is None else parsed.folder / parsed.name(number)
+
+
+def titles(patterns: Sequence[str | Path]) -> list[str]:
+    """Names of files or patterns, without number, view and ending; all differ.
+
+    `mv.%V.####.exr` is mv. One that is called as another before it is called as the folder in
+    which its path differs from the first: beauty/s.####.exr, mv/s.####.exr are s and mv.
+    """
+    found: list[str] = []
+    for i, pattern in enumerate(patterns):
+        folders = zip_longest(*(Path(p).parts[-2::-1] for p in (pattern, patterns[0])))
+        names = [_title(pattern), *(_plain(own or "") for own, other in folders if own != other)]
+        free = [name for name in names if name and name not in found]
+        found.append(free[0] if free else f"{names[0]}_{i + 1}")
+    return found
+
+
+def _title(path: str | Path) -> str:
+    parsed = _parsed(path)
+    if parsed is None:
+        return _plain(re.sub(r"([0-9]+)(?=\.[^.\d][^.]*$)", "", Path(path).name).rpartition(".")[0])
+    return _plain(parsed.begin + "." + parsed.end.rpartition(".")[0])
+
+
+def _plain(name: str) -> str:
+    """A name as one of a layer: without %V, and `_` for what stands between words."""
+    return re.sub(r"[\W_]+", "_", name.replace("%V", "")).strip("_")
 
 
 def has_view(path: str | Path) -> bool:

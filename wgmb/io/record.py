@@ -56,6 +56,14 @@ def read(data: bytes | mmap.mmap) -> dict[str, Any] | None:
     return None
 
 
+def content_of(text: object) -> dict[str, Any] | None:
+    """The content of a record's text, whether the file is whole or not; None if it is none."""
+    if not isinstance(text, str) or not is_begun(text):
+        return None
+    stated = _stated(text.encode("latin-1", "replace"), 0)
+    return stated[0] if stated else None
+
+
 def _stated(data: bytes | mmap.mmap, begin: int) -> tuple[dict[str, Any], int] | None:
     """The content of the record that begins there, and its length [bytes]; None if it is broken."""
     text = record_block.text_at(data, begin, 65536).decode("latin-1")

@@ -65,7 +65,19 @@ def read(
     names the file where it is missing, damaged, cut off, no picture or beyond that limit, and
     where memory is short.
     """
-    path = Path(path)
+    return _decoded(Path(path), max_mb, lambda samples: _to_linear(samples, space))
+
+
+def samples(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
+    """(height, width, 1 to 4) samples as they are stored: uint8, uint16 or floats.
+
+    Grey of a PNG is repeated in three channels. The rest is as for `read`.
+    """
+    return _decoded(Path(path), max_mb, _checked)
+
+
+def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """The file's samples, converted; every failure is an InputError that names the file."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
 
@@ -76,7 +88,7 @@ def read(
         limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
 
     try:
-        return _to_linear(_READERS[path.suffix.lower()](path.read_bytes(), allow), space)
+        return convert(_READERS[path.suffix.lower()](path.read_bytes(), allow))
     except InputError:
         raise
     except MemoryError:
@@ -145,17 +157,23 @@ _READERS = {
 }
 
 
-def _to_linear(samples: np.ndarray, space: ColorSpace | None) -> np.ndarray:
+def _checked(samples: np.ndarray) -> np.ndarray:
+    """Samples as (height, width, 1 to 4); ValueError where they are none of one image."""
     if samples.ndim == 2:
         samples = samples[..., None]
     if samples.ndim != 3 or 0 in samples.shape or samples.shape[2] not in (1, 2, 3, 4):
         raise ValueError(f"must be one grey, RGB or RGBA image, got shape {samples.shape}")
+    if samples.dtype.kind != "f" and samples.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"samples must be 8 or 16 bit or float, got {samples.dtype}")
+    return samples
+
+
+def _to_linear(samples: np.ndarray, space: ColorSpace | None) -> np.ndarray:
+    samples = _checked(samples)
     if samples.shape[2] < 3:  # grey, grey and alpha
         samples = np.concatenate([samples[..., :1]] * 3 + [samples[..., 1:]], axis=2)
     if samples.dtype.kind == "f":
         return samples.astype(np.float32) if space is None else space.linear(samples)
-    if samples.dtype not in (np.uint8, np.uint16):
-        raise ValueError(f"samples must be 8 or 16 bit or float, got {samples.dtype}")
     most = np.iinfo(samples.dtype).max
     table = np.arange(most + 1, dtype=np.float32) / np.float32(most)
     if space is None:

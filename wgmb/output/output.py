@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -59,6 +59,9 @@ class Output:
     name or a setting that does not fit, and for existing files.
     """
 
+    _ENDS: ClassVar[tuple[str, ...]] = (".exr", *STILLS, *VIDEOS)
+    _has_record = True  # every file holds one
+
     def __init__(
         self,
         pattern: str | Path,
@@ -91,8 +94,8 @@ class Output:
         self._overwrite, self._resume, self._since = overwrite, resume, since
         self._abandoned, self._is_whole, self._count, self._replaces = False, True, 0, overwrite
         self._under_way: Path | None = None
-        if suffix not in (".exr", *STILLS, *VIDEOS):
-            known = ", ".join((".exr", *STILLS, *VIDEOS))
+        if suffix not in self._ENDS:
+            known = ", ".join(self._ENDS)
             raise InputError(f"output {pattern}: the name must end in one of {known}")
         if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
@@ -275,7 +278,8 @@ class Output:
         if not (self._resume or self._overwrite) and path.exists():
             raise InputError(f"{path} was written by another process during this run")
         self._under_way = atomic.temporary_name(path)
-        atomic.write_file(path, *record.seal(data, text), temporary=self._under_way)
+        pieces = record.seal(data, text) if self._has_record else [data]
+        atomic.write_file(path, *pieces, temporary=self._under_way)
 
     def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
         """The file at `path`, with the record's text."""

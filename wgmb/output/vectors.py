@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, check_choice
-from ..io import exr, record, stills
+from ..io import data_files, exr, record, stills
 from ..io.frame_numbers import has_view
 from ..sequence.data_windows import laid
 from ..sequence.frame_file import FrameFile
 from .output import Output
 from .result import Result
 
-PROGRAMS = ("nuke", "rsmb", "blender", "plain")
+PROGRAMS = ("nuke", "rsmb", "blender", "plain", "flo")
 """Whose vectors can be written; CONVENTIONS in vectors.py has what the numbers mean."""
 MAX_DISPLACE = 2048.0
 """The motion [px] that rsmb's 0 and 1 stand for, unless another is given."""
@@ -41,6 +41,8 @@ def written(
         half = np.float32(0.5 / max_displace)
         red, green = (np.clip(0.5 + v * half, 0, 1) for v in (nx, -ny))
         return {"R": red, "G": green, "B": np.zeros_like(red)}
+    if program == "flo":
+        return {"u": nx, "v": ny}
     return {"to_prev.x": px, "to_prev.y": py, "to_next.x": nx, "to_next.y": ny}
 
 
@@ -48,11 +50,14 @@ class VectorOutput(Output):
     """Files of motion vectors in a program's form; `written` makes the numbers.
 
     `program`: one of PROGRAMS. EXR files are 32-bit floats and have the windows of the input;
-    rsmb's may be PNG or TIFF of 16 bits too, which cover the display window. Alpha of rsmb's is 1
-    where the vectors are valid. `max_displace`: of rsmb's [px]. `mask_of`: the channel of a frame
-    that is 1 where its vectors are valid (Clip.vector_mask). `clipped` has the number of pixels
-    that rsmb's form clipped, by frame. The others are as for Output.
+    rsmb's may be PNG or TIFF of 16 bits too, which cover the display window, and say in their
+    records what `max_displace` is. A .flo covers it too, and has no record: it cannot be resumed.
+    Alpha of rsmb's is 1 where the vectors are valid. `max_displace`: of rsmb's [px]. `mask_of`: the
+    channel of a frame that is 1 where its vectors are valid (Clip.vector_mask). `clipped` has the
+    number of pixels that rsmb's form clipped, by frame. The others are as for Output.
     """
+
+    _ENDS = (".exr", *_DEEP, data_files.FLO)
 
     def __init__(
         self,
@@ -68,10 +73,14 @@ class VectorOutput(Output):
         resume: bool = False,
         views: Sequence[str] = (),
     ):
-        _check(str(pattern), program, max_displace)
+        _check(str(pattern), program, max_displace, resume)
+        self._program, self._mask_of = program, mask_of
+        self._has_record = program != "flo"
+        self._max_displace = MAX_DISPLACE if max_displace is None else max_displace
+        unit = {"max_displace": self._max_displace} if program == "rsmb" else {}
         super().__init__(
             pattern,
-            settings=settings,
+            settings=(settings or {}) | {"as": program} | unit,
             numbers=numbers,
             bits=16 if str(pattern).lower().endswith(_DEEP) else 8,
             inputs=inputs,
@@ -79,8 +88,6 @@ class VectorOutput(Output):
             resume=resume,
             views=views,
         )
-        self._program, self._mask_of = program, mask_of
-        self._max_displace = MAX_DISPLACE if max_displace is None else max_displace
         self.clipped: dict[int, int] = {}
 
     @property
@@ -97,6 +104,11 @@ class VectorOutput(Output):
             over = np.abs(motion[..., 2:]).max(axis=2) > self._max_displace
             if count := int(over.sum()):
                 self.clipped[source.number] = self.clipped.get(source.number, 0) + count
+        if self._program == "flo":
+            shown = source.data_window, source.display_window
+            return data_files.encode_flo(
+                np.stack([laid(channels[c], *shown) for c in "uv"], axis=2)
+            )
         if path.suffix.lower() == ".exr":
             return exr.encode(_file(source, channels, {record.KEY: text}, view))
         return stills.encode(_in_display(source, channels), path.suffix, 16, text, _as_data)
@@ -109,11 +121,13 @@ class VectorOutput(Output):
         return valid
 
 
-def _check(pattern: str, program: str, max_displace: float | None) -> None:
+def _check(pattern: str, program: str, max_displace: float | None, resume: bool) -> None:
     check_choice("`program`", program, PROGRAMS)
-    ends = (".exr", *_DEEP) if program == "rsmb" else (".exr",)
+    ends = {"rsmb": (".exr", *_DEEP), "flo": (data_files.FLO,)}.get(program, (".exr",))
     if not pattern.lower().endswith(ends):
         raise InputError(f"output {pattern}: {program} vectors need {' or '.join(ends)}")
+    if resume and program == "flo":
+        raise InputError("`resume` needs the record of a file, which a .flo cannot hold")
     if max_displace is not None and program != "rsmb":
         raise InputError(f"`max_displace` is for rsmb vectors, {program} vectors are in pixels")
     if max_displace is not None and not 0 < max_displace < 1e6:

@@ -19,6 +19,7 @@ from ..io.frame_numbers import (
     numbered,
     numbers_on_disk,
     readable,
+    titles,
     views_on_disk,
 )
 from .findings import SequenceFindings
@@ -56,6 +57,11 @@ class SequenceFiles:
     def paths(self, number: int) -> list[Path]:
         """The files that frame `number` is read from; %V stands for its views."""
         return [frame_path(pattern, number) for pattern in (self.pattern, *self._also)]
+
+    @cached_property
+    def titles(self) -> list[str]:
+        """Names of the files of a frame (see frame_numbers.titles)."""
+        return titles([self.pattern, *self._also])
 
     def every_path(self, number: int) -> list[Path]:
         """The same, once for each view."""

@@ -57,6 +57,8 @@ class FrameBuilder:
             motion = reprojections = ids = None
             depth = self._depth(source)
             if convention is not None:
+                if "color" in wanted:
+                    self._check_vectors(source, convention)
                 motion = vectors.read(own, convention, source.reference_channel)
             camera = self._cameras.get(source.view)
             if motion is None and camera is None and self.picture_motion is not None:
@@ -86,6 +88,17 @@ class FrameBuilder:
                 scale=self._masks.scale(source),
                 object_motion=passes.object_motion,
                 number=source.number,
+            )
+
+    def _check_vectors(self, source: FrameFile, convention: vectors.Vectors) -> None:
+        """InputError where the picture would be read as vectors."""
+        own, near = self._stored.own(source), source.reference_channel
+        sides = vectors.channels_of(own, convention, near)
+        both = {name for pair in sides.values() for name in pair} & set(source.color)
+        if both:
+            raise InputError(
+                f"the vectors would be {', '.join(sorted(both))} of the picture itself; "
+                "`vector_layer` names another layer, `also` adds that of another file"
             )
 
     def check_layers(self) -> None:

@@ -61,9 +61,9 @@ class FrameCache:
             while len(self._kept) >= self.most_kept:
                 self._kept.popitem(last=False)
             passes, paths = self.passes, self.files.paths(number)
-            names = self.files.view_names
+            names, titles = self.files.view_names, self.files.titles
             found = read(
-                paths, number, passes.color, self._max_mb, names, self._space, passes.layers
+                paths, number, passes.color, self._max_mb, names, self._space, passes.layers, titles
             )
             if self._space is not None:
                 found = tuple(in_space(source, self._space) for source in found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 
 from ..color.spaces import ColorSpace
 from ..errors import InputError, size_text
-from ..io import exr, limits, stills
+from ..io import data_files, exr, limits, record, stills
 from ..io.frame_numbers import (
     frame_range,
     has_view,
@@ -21,8 +21,9 @@ from ..io.frame_numbers import (
     readable,
 )
 from .data_windows import Window, laid
-from .layers import names, stereo, vectors
+from .layers import light, names, stereo, vectors
 
+_SUFFIXES = (".exr", *stills.SUFFIXES, data_files.FLO)
 _NO_PICTURE = "view {} has no picture and is left as it is"
 
 
@@ -40,6 +41,8 @@ class FrameFile:
     view: str | None = None  # channels have their names without it
     origin: stereo.Places = field(default_factory=dict)  # of the channels that are in `file`
     shared: frozenset[str] = frozenset()  # names of channels in no view
+    further: frozenset[str] = frozenset()  # of channels of other files than the picture's
+    units: dict[str, data_files.Unit] = field(default_factory=dict)  # of vectors, by their layer
     space: ColorSpace | None = None  # of the picture, where it is not for attributes to say
     made_linear: bool = False  # the picture is not as it is stored, but in `space`
     notes: tuple[str, ...] = ()  # what a user should know about it
@@ -54,6 +57,8 @@ class FrameFile:
         """Names of the picture's channels, 3 or 4 (see layers.find_color)."""
         with about(self.name):
             own = [name for name in self.channels if name not in self.shared]
+            with contextlib.suppress(InputError):
+                return names.find_color([n for n in own if n not in self.further], self.wanted)
             return names.find_color(own, self.wanted)
 
     @property
@@ -145,7 +150,7 @@ def _is_same(a: np.ndarray, b: np.ndarray) -> bool:
 def is_video(pattern: str | Path) -> bool:
     """Return True for a file that is neither an EXR nor a still."""
     path = Path(pattern)
-    return path.suffix.lower() not in (".exr", *stills.SUFFIXES) and readable(path)
+    return path.suffix.lower() not in _SUFFIXES and readable(path)
 
 
 def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
@@ -179,8 +184,13 @@ def read(
     named: Sequence[str] = (),
     space: ColorSpace | None = None,
     layers: Sequence[str] = (),
+    titles: Sequence[str] = ("",),
 ) -> tuple[FrameFile, ...]:
     """Every view of a frame, the default one first; the channels of its files together.
+
+    `titles`: a name for each path. Of files other than the first, layers without a name of their
+    own, or with one that is taken, have that of their file; stills among them hold numbers, which
+    are not decoded as light.
 
     `wanted`: the picture's layer. `max_mb`: megabytes that each file may unpack to. `named`: the
     views, if %V stands for them in the first path; else that file tells them. In the other paths
@@ -196,8 +206,11 @@ def read(
     found = []
     for view in there:
         contents = [
-            (files.content(in_view(path, view), which), has_view(path) and view is not None)
-            for path, which in zip(paths, (space, *(None for _ in paths[1:])), strict=True)
+            (
+                files.content(in_view(path, view), None if i else space, title if i else ""),
+                has_view(path) and view is not None,
+            )
+            for i, (path, title) in enumerate(zip(paths, titles, strict=True))
         ]
         chosen = [(c, c.chosen(view, there[0], whole)) for c, whole in contents]
         found.append(_together(chosen, number, wanted, view))
@@ -211,8 +224,10 @@ class _Content:
 
     path: Path
     file: exr.Exr | None  # None: a still
-    planes: dict[str, np.ndarray]  # of a still
+    planes: dict[str, np.ndarray]  # of a still, or a flow file
     views: dict[str | None, stereo.Places]
+    title: str = ""  # what its layers without a name are called; "": it is the picture's file
+    unit: data_files.Unit | None = None  # of its vectors, if it says so
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -242,22 +257,31 @@ class _Files:
         self._max_mb, self._layers = max_mb, layers
         self._read: dict[Path, _Content] = {}
 
-    def content(self, path: Path, space: ColorSpace | None) -> _Content:
+    def content(self, path: Path, space: ColorSpace | None, title: str = "") -> _Content:
         """Contents of the file; `space`: of a still."""
         if path not in self._read:
-            self._read[path] = self._content(path, space)
+            self._read[path] = self._content(path, space, title)
         return self._read[path]
 
-    def _content(self, path: Path, space: ColorSpace | None) -> _Content:
-        if path.suffix.lower() == ".exr":
+    def _content(self, path: Path, space: ColorSpace | None, title: str) -> _Content:
+        suffix = path.suffix.lower()
+        if suffix == ".exr":
             file = exr.read(path, max_mb=self._max_mb, data_layers=vectors.STEMS)
-            return _Content(path, file, {}, stereo.by_view(file, self._layers))
-        if path.suffix.lower() in stills.SUFFIXES:
+            unit = data_files.unit_of(record.content_of(file.parts[0].attributes.get(record.KEY)))
+            return _Content(path, file, {}, stereo.by_view(file, self._layers), title, unit)
+        if suffix == data_files.FLO:
+            data = data_files.read(path, max_mb=self._max_mb)
+            return _Content(path, None, vectors.named_as_flow(data.planes, title), {}, title)
+        if suffix in stills.SUFFIXES and title and not light.is_pass(title):
+            data = data_files.read(path, max_mb=self._max_mb)
+            return _Content(path, None, data.planes, {}, title, data.unit)
+        if suffix in stills.SUFFIXES:
             rgba = stills.read(path, max_mb=self._max_mb, space=space)
             planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
-            return _Content(path, None, planes, {})
-        known = ", ".join((".exr", *stills.SUFFIXES))
-        raise InputError(f"{path}: cannot read this kind of file; frames may be {known}")
+            return _Content(path, None, planes, {}, title)
+        raise InputError(
+            f"{path}: cannot read this kind of file; frames may be {', '.join(_SUFFIXES)}"
+        )
 
 
 def _together(
@@ -273,6 +297,8 @@ def _together(
     origin: stereo.Places = {}
     shared: set[str] = set()
     notes: dict[str, None] = {}
+    further: set[str] = set()
+    units: dict[str, data_files.Unit] = {}
     onto: exr.Part | None = None
     size: tuple[int, int] | None = None
     for content, keys in contents:
@@ -295,6 +321,14 @@ def _together(
             ranked = sorted(content.file.parts, key=lambda part: id(part) not in of_view)
             for part in reversed(ranked):
                 attributes = {**part.attributes, **attributes}
+        title = content.title
+        while title and any(name.startswith(f"{title}.") for name in channels):
+            title += "_2"
+        if content is not main:
+            more = _titled(more, title, channels)
+            further |= more.keys()
+        if content.unit is not None:
+            units[title] = content.unit
         for name, plane in more.items():
             size = size or plane.shape[::-1]
             if plane.shape[::-1] != size:
@@ -302,7 +336,7 @@ def _together(
                     f"{content.path}: layer {name} is {size_text(plane)}, "
                     f"{main.path.name} is {size_text(size)}"
                 )
-            channels.setdefault(name, plane)
+            channels[name] = plane
     return FrameFile(
         number,
         main.path,
@@ -314,8 +348,23 @@ def _together(
         view,
         origin,
         frozenset(shared),
+        frozenset(further),
+        units,
         notes=tuple(notes),
     )
+
+
+def _titled(
+    more: dict[str, np.ndarray], title: str, taken: Collection[str]
+) -> dict[str, np.ndarray]:
+    """The channels of another file than the picture's: layers have names that are not `taken`."""
+    found = {}
+    for layer, members in names.layers(more).items():
+        is_taken = any(member in taken for member in members)
+        for member in members:
+            is_bare = not layer and names.is_component(member)
+            found[f"{title}.{member}" if is_taken or is_bare else member] = more[member]
+    return found
 
 
 def _noted(views: tuple[FrameFile, ...], empty: Sequence[str]) -> tuple[FrameFile, ...]:

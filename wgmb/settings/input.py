@@ -27,8 +27,8 @@ class InputSettings:
     "Motion vector convention: auto (detected), none, or a name."
     vector_layer: str | None = None
     "Motion vector layer, if it cannot be found by name."
-    vector_scale: float = 1.0
-    "Factor applied to the motion vectors."
+    vector_scale: float | tuple[float, float] = 1.0
+    "Factor applied to the motion vectors, or one for x and one for y, such as 1920,1080."
     vector_offset: float | None = None
     "Value that encodes zero motion, subtracted before scaling (vray, rsmb: 0.5)."
     vector_flip: Literal["x", "y", "xy"] | None = None

@@ -116,7 +116,7 @@ def describe(
         lines.append(("colour", f"{text}; shown on {display.display}, {display.view}"))
     depth = names.find_depth(source.channels, clip.passes.depth, source.reference_channel)
     lines.append(("depth", depth or "none"))
-    lines.append(("vectors", clip.finding))
+    lines.append(("vectors", as_options(clip.finding)))
     lines.append(("light", clip.light_passes(source).text))
     if valid := clip.vector_mask(source):
         lines.append(("valid", f"vectors are used where {valid} is 1"))

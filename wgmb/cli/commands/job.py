@@ -129,7 +129,7 @@ def job(
         note(as_options(text))
     if not quiet:
         if made.clip.is_finding_notable:
-            note(f"vectors: {made.clip.finding}")
+            note(f"vectors: {as_options(made.clip.finding)}")
         frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
         note(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ...errors import counted
+from ...errors import InputError, counted
+from ...io.data_files import FLO
 from ...output.vectors import PROGRAMS
 from ...run.vectors import VectorsRequest
 from ..conclusion import conclude
@@ -22,8 +23,11 @@ def vectors(
     *,
     output: Annotated[str, Parameter(alias="-o")],
     program: Annotated[
-        str, Parameter(name="--as", help=f"Form of the vectors: {', '.join(PROGRAMS)}.")
-    ],
+        str | None,
+        Parameter(
+            name="--as", help=f"Form of the vectors: {', '.join(PROGRAMS)}; of a .flo it is flo."
+        ),
+    ] = None,
     max_displace: float | None = None,
     overwrite: bool = False,
     resume: bool = False,
@@ -40,7 +44,7 @@ def vectors(
     pattern
         Frames with vectors in any convention, or with depth and a --camera.
     output
-        Pattern or file: .exr (32-bit floats); rsmb also .png or .tif of 16 bits.
+        Pattern or file: .exr (32-bit floats); rsmb also .png or .tif of 16 bits; .flo.
     max_displace
         rsmb: motion in pixels that 0 and 1 encode; default: 2048.
     overwrite
@@ -54,6 +58,10 @@ def vectors(
     quiet
         Print errors only.
     """
+    if program is None:
+        if not output.lower().endswith(FLO):
+            raise InputError(f"`program` is missing: the form of {output}, {', '.join(PROGRAMS)}")
+        program = "flo"
     request = VectorsRequest(
         pattern=pattern,
         output=output,

@@ -73,6 +73,9 @@ _UNUSED = (
     "refraction",
     "rawrefraction",
 )
+_PASSES = frozenset(
+    name for family in _FAMILIES for name in (*family.direct, *family.indirect, *family.color)
+)
 _EFFECT = {"diffuse_light": "shadows", "glossy_light": "reflections"}
 
 
@@ -123,10 +126,14 @@ def find(names: Iterable[str], picture: str | None) -> LightPasses:
     view_layer = layer.rpartition(".")[0]
     is_beauty = layer == "" or _plain(layers.stem(layer)) in _BEAUTY
     there: dict[str, tuple[str, ...]] = {}
+    ends: dict[str, tuple[str, ...]] = {}
     for name, members in layers.layers(names, near=picture).items():
         rgb = layers.rgb(members)
         if rgb and name.rpartition(".")[0] in (view_layer, ""):
             there.setdefault(_plain(layers.stem(name)), tuple(rgb[:3]))
+            if end := layers.ending(name, _PASSES):
+                ends.setdefault(end, tuple(rgb[:3]))
+    there = ends | there
     found: dict[str, Light] = {}
     lacking: dict[str, str] = {}
     for family in _FAMILIES:
@@ -152,6 +159,11 @@ def find(names: Iterable[str], picture: str | None) -> LightPasses:
     missing = "; ".join(text for kind, text in lacking.items() if kind not in found)
     unused = tuple(_layer(there[name]) for name in _UNUSED if name in there)
     return LightPasses(tuple(found.values()), missing or None, unused)
+
+
+def is_pass(layer: str) -> bool:
+    """Return True for the name of a pass of light, or of the colour of surfaces."""
+    return layers.ending(layer, _PASSES) is not None
 
 
 def read(channels: Mapping[str, np.ndarray], passes: LightPasses) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
@@ -24,7 +25,15 @@ _COMPONENTS = (
 _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
 TRIPLES = {"normal": ("normal", "normals", "n")}
 """Layers of three channels, as stems of their names, by the input of a Frame that they are."""
-_DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "z-depth", "z_depth", "worlddepth")
+_DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "worlddepth")
+_OF_SPACE = frozenset(
+    ("n", "normal", "normals", "p", "pos", "position", "positions", "pref", "world", "tangent",
+     "light", "point", "reflection", "refraction")
+)  # fmt: skip
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")  # mv2DToonz: mv, 2, D, Toonz
+_VERSION = re.compile(
+    r"[0-9]+|v|raw|pass|aov|filtered|unfiltered"
+)  # words that say nothing of what a layer holds
 
 
 def layers(names: Iterable[str], near: str | None = None) -> dict[str, list[str]]:
@@ -50,9 +59,47 @@ def component(channel: str) -> str:
     return channel.rpartition(".")[2].lower()
 
 
+def is_component(channel: str) -> bool:
+    """Return True for R, x, u, ... or Y, which say nothing of their layer, unlike Z."""
+    own = component(channel)
+    return channel not in ("Z", "z") and any(own in kinds for kinds in _COMPONENTS)
+
+
 def stem(layer: str) -> str:
     """The last part of a layer's name, in lower case: "ViewLayer.Depth" -> "depth"."""
     return layer.rpartition(".")[2].lower()
+
+
+def ending(layer: str, stems: Collection[str]) -> str | None:
+    """The one of `stems` (lower case, letters and digits) that a layer's name is, or ends in.
+
+    Words may be joined or apart, and others may come before them: `Motion Vector`, `motion_vector`
+    and `shot010_beauty_MotionVector_v2` are all `motionvector`.
+    """
+    words = words_of(layer)
+    while len(words) > 1 and "".join(words) not in stems and _VERSION.fullmatch(words[-1]):
+        words.pop()
+    ends = ("".join(words[i:]) for i in range(len(words)))
+    return next((end for end in ends if end in stems), None)
+
+
+def words_of(layer: str) -> list[str]:
+    """The words of the last part of a layer's name, in lower case."""
+    return [word.lower() for word in _WORD.findall(layer.rpartition(".")[2])]
+
+
+def is_of_space(layer: str, end: str = "") -> bool:
+    """Return True if a name speaks of places or directions in space before its `end`: `P_Z`."""
+    words = words_of(layer)
+    while end and words:
+        last = words.pop()
+        end = end.removesuffix(last)
+    return bool(_OF_SPACE & set(words))
+
+
+def is_whole(layer: str, end: str) -> bool:
+    """Return True if `end`, of `ending`, is all of a layer's name."""
+    return "".join(words_of(layer)) == end
 
 
 def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
@@ -116,8 +163,11 @@ def find_depth(
         return one_channel(by_layer, wanted, "depth layer")
     if "Z" in by_layer.get("", ()):
         return "Z"
-    named = [k for word in _DEPTH for k in by_layer if stem(k) == word]
-    return by_layer[named[0]][0] if named else None
+    kinds = {
+        k: found for k in by_layer if (found := ending(k, _DEPTH)) and not is_of_space(k, found)
+    }
+    ranked = sorted(kinds, key=lambda k: (not is_whole(k, kinds[k]), _DEPTH.index(kinds[k])))
+    return by_layer[ranked[0]][0] if ranked else None
 
 
 def find_triple(names: Iterable[str], stems: Collection[str], near: str | None = None) -> list[str]:
@@ -134,9 +184,13 @@ def pick(by_layer: Mapping[str, list[str]], wanted: str, kind: str) -> str:
     """The layer called `wanted`: its full name, or its last part if that is unambiguous."""
     if wanted in by_layer:
         return wanted
-    alike = [k for k in by_layer if stem(k) == wanted.lower()]
-    if len(alike) == 1:
-        return alike[0]
+    plain = "".join(_WORD.findall(wanted)).lower()
+    for alike in (
+        [k for k in by_layer if stem(k) == wanted.lower()],
+        [k for k in by_layer if plain and ending(k, (plain,))],
+    ):
+        if len(alike) == 1:
+            return alike[0]
     there = ", ".join(map(repr, by_layer))
     raise MissingLayerError(f"no {kind} {wanted!r}; available: {there}")
 

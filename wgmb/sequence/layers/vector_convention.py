@@ -54,7 +54,7 @@ class ConventionFinder:
         wanted, there = self._wanted, self._stored.files.on_disk
         if wanted.convention == "none":
             return vector_test.ConventionFinding(None, False, "none requested")
-        found = vector_test.ConventionFinding(None, False, "no vector layer found")
+        found = self._none_found(there[0])
         evidence: list[vector_test.Evidence] = []
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
@@ -64,20 +64,44 @@ class ConventionFinder:
                 if wanted.convention != "auto":
                     return vector_test.ConventionFinding(named, True, str(named))
                 evidence.append(self._evidence(source, named))
-                found = vector_test.decide(named, evidence)
-                if found.sure and found.vectors == named:
+                has_both = self._has_both(source, named)
+                found = vector_test.decide(named, evidence, has_both=has_both)
+                seen = {side for e in evidence for side in e.sides}
+                if found.sure and found.vectors == named and (len(seen) == 2 or not has_both):
                     break
         return found
+
+    def _none_found(self, number: int) -> vector_test.ConventionFinding:
+        """The finding where no name speaks for vectors; a layer that may hold some is named."""
+        none = vector_test.ConventionFinding(None, False, "no vector layer found")
+        with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+            source = self._stored.leader(number)
+            color = source.color if source.reference_channel else ()
+            own = {k: v for k, v in self._stored.own(source).items() if k not in color}
+            if perhaps := vectors.candidates(own, source.reference_channel):
+                verb = "has" if len(perhaps) == 1 else "have"
+                text = f"none found by name, but {' and '.join(perhaps)} {verb} negative numbers"
+                text = f"{text}; `vector_layer='{perhaps[0]}'` takes {perhaps[0]}"
+                return vector_test.ConventionFinding(None, False, text, notable=True)
+        return none
 
     def _named(self, number: int) -> tuple[FrameFile, vectors.Vectors | None]:
         """The vectors that the layers' names speak for, in the first view that has any."""
         first = self._stored.leader(number)
         for source in dict.fromkeys((first, *self._stored.all(number))):
-            if named := vectors.named(
-                self._stored.own(source), self._wanted, source.reference_channel
-            ):
-                return source, named
+            own, near = self._stored.own(source), source.reference_channel
+            if named := vectors.named(own, self._wanted, near, source.units):
+                is_open = self._wanted.convention == "auto"
+                return source, vectors.settled(own, named, source.whole, near) if is_open else (
+                    vectors.in_pixels(named, source.whole)
+                )
         return first, None
+
+    def _has_both(self, source: FrameFile, named: vectors.Vectors) -> bool:
+        """True if the vectors to either frame are layers of their own."""
+        form, near = vectors.CONVENTIONS[named.convention], source.reference_channel
+        sides = vectors.channels_of(self._stored.own(source), named, near)
+        return len(sides) == 2 and form.prev == form.next
 
     def _evidence(self, source: FrameFile, named: vectors.Vectors) -> vector_test.Evidence:
         if source.reference_channel is None:
@@ -88,7 +112,7 @@ class ConventionFinder:
         onto = union([source.data_window, *(window for _, window in filter(None, near))])
         color, motion = (laid(a, source.data_window, onto) for a in (source.rgba, motion))
         prev, next_ = (one and laid(*one, onto) for one in near)
-        return vector_test.gathered(color, motion, prev, next_)
+        return vector_test.gathered(color, motion, prev, next_, source.whole)
 
     def _probe(self, source: FrameFile, side: int) -> tuple[np.ndarray, Window] | None:
         """The picture of a neighbour and its data window, to test vectors on."""

@@ -1,8 +1,9 @@
 """Meaning of the numbers of motion vectors, tested by warping the neighbouring frames.
 
-A reading of the vectors is a flip of their axes and a scale. The right one puts the colours of the
-neighbouring frames where those of the frame are. Up to _PROBES moving pixels are compared, over
-all frames that are tested together.
+A reading of the vectors is a flip of their axes, and a scale along each. The right one puts the
+colours of the neighbouring frames where those of the frame are. Up to _PROBES moving pixels are
+compared, over all frames that are tested together. Of vectors that are all below a pixel, the unit
+is unknown: they may be fractions of the picture, or of the longest motion.
 """
 
 from __future__ import annotations
@@ -22,9 +23,14 @@ _HARDLY = 0.85  # of the stated reading's difference, roughly: more is not clear
 _GOLDEN = (5**0.5 - 1) / 2
 _STEPS = 10  # of the golden section: to 0.1 % of the scale
 _PLAIN = tuple(sorted({float(n) for n in range(1, 11)} | {1 / n for n in range(2, 11)}))
+_POWERS = tuple(2.0**n for n in range(1, 15))  # as which the longest motion is chosen [px]
+_FRACTIONS = (1.0, 0.5)  # of the picture's size: from 0 to 1, and from -1 to 1
 _FLIPS = ("", "y", "x", "xy")
 _MOVING = 1.0  # [px] slower pixels say nothing about a convention
-_STILL = 0.05  # [px] vectors that are shorter everywhere are 0: 16-bit integers have no middle
+_STILL = 0.05  # [px] vectors that are shorter everywhere are 0, unless they have another unit
+_NOTHING = 1e-5  # vectors that are shorter everywhere are 0, whatever their unit
+_TOP = 0.999  # quantile of the speeds that is the fastest of vectors of an unknown unit
+_SLOW = 0.05  # of it: slower pixels say nothing
 _FEWEST = 16  # moving pixels that say anything
 _BRIGHT = 1e4  # light beyond this is all the same
 _MOST = 0.3  # difference of tones beyond which a pixel has merely changed
@@ -56,10 +62,16 @@ class Evidence:
     )
     """To each neighbour: tones (n, 3) and places (n, 2) of the probes, their motion there as read
     (n, 2), and the neighbour's tones (height, width, 3)."""
-    zero: bool = False
-    """The vectors are 0 everywhere."""
+    sides: tuple[int, ...] = ()
+    """Of each lookup: -1 to the previous frame, 1 to the next."""
+    fastest: float = 0.0
+    """Length of the longest vectors [px, as read]."""
+    is_below: bool = False
+    """All vectors are below a pixel, so that their unit is unknown."""
     differs: bool = False
-    """The picture differs from a neighbour by more than noise."""
+    """The picture differs from a neighbour by more than noise; only looked at where `is_below`."""
+    whole: tuple[int, int] = (1, 1)
+    """Width and height [px] of the whole picture."""
     doubt: str = ""
     """The reason why it cannot be tested."""
 
@@ -70,32 +82,38 @@ class Evidence:
 
 
 def gathered(
-    color: np.ndarray, motion: np.ndarray, prev: np.ndarray | None, next_: np.ndarray | None
+    color: np.ndarray,
+    motion: np.ndarray,
+    prev: np.ndarray | None,
+    next_: np.ndarray | None,
+    whole: tuple[int, int] | None = None,
 ) -> Evidence:
     """The evidence of a frame: `color` and the neighbours (height, width, 3 or 4), linear.
 
     `motion`: (height, width, 4) [px], to_prev and to_next as they are read. A neighbour that is
-    not there, or of another size, is None.
+    not there, or of another size, is None. `whole`: width and height of the display window.
     """
-    sides = [
-        (m, _tone(c[..., :3]))
-        for m, c in ((motion[..., :2], prev), (motion[..., 2:], next_))
+    sides = {
+        side: (m, _tone(c[..., :3]))
+        for side, m, c in ((-1, motion[..., :2], prev), (1, motion[..., 2:], next_))
         if c is not None and c.shape[:2] == color.shape[:2]
-    ]
+    }
     if not sides:
         return Evidence(doubt="no neighbouring frame to test it on")
-    with np.errstate(invalid="ignore"):
-        zero = not (np.abs(motion) > _STILL).any()
-    if zero:
+    speeds = _speeds([m for m, _ in sides.values()])
+    at = _some(speeds > _MOVING)
+    fastest, is_below = _fastest(speeds, at), len(at) < _FEWEST
+    if is_below:
         here = _tone(color[..., :3])
-        differs = any(_differ(here, tone) for _, tone in sides)
-        return Evidence(zero=True, differs=differs, doubt=_NOTHING_MOVES)
-    at = _moving_pixels([m for m, _ in sides])
-    if len(at) < _FEWEST:
-        return Evidence(doubt=_NOTHING_MOVES)
+        differs = any(_differ(here, tone) for _, tone in sides.values())
+        at = _some(speeds > max(_SLOW * fastest, _NOTHING))
+        if not differs or len(at) < _FEWEST:
+            return Evidence(fastest=fastest, is_below=True, differs=differs, doubt=_NOTHING_MOVES)
     y, x = at.T
     tones, places = _tone(color[y, x, :3]), at[:, ::-1].astype(np.float32)
-    return Evidence([(tones, places, m[y, x], tone) for m, tone in sides])
+    lookups = [(tones, places, m[y, x], tone) for m, tone in sides.values()]
+    size = whole or color.shape[1::-1]
+    return Evidence(lookups, tuple(sides), fastest, is_below, is_below, size)
 
 
 _NOTHING_MOVES = "nothing moves, so it cannot be tested"
@@ -103,90 +121,181 @@ _ZERO = (
     "by name; they are 0 everywhere, but the pictures differ, so nothing will be blurred: "
     "was the renderer's own motion blur on (Blender), or off (Arnold, Redshift)?"
 )
+_BELOW = (
+    "by name; they are all below a pixel, but the pictures differ by more, and no unit of them "
+    "predicts the neighbouring frame: check them (`vector_scale`, `vector_offset`)"
+)
 
 
-def decide(vectors: Vectors, evidence: Sequence[Evidence]) -> ConventionFinding:
+@dataclass(frozen=True)
+class _Reading:
+    """Factors of the vectors as they were read."""
+
+    flip: str = ""
+    x: float = 1.0
+    y: float = 1.0
+    unit: float = 1.0  # x and y are so many times that of the unit that was tried
+    is_turned: bool = False
+
+    def of(self, vectors: Vectors) -> Vectors:
+        """`vectors`, read so."""
+        meant = replace(vectors, flip=_combine(vectors.flip, self.flip))
+        meant = replace(meant, turned=vectors.turned != self.is_turned)
+        return meant.scaled(self.x, self.y)
+
+
+_STATED = _Reading()
+
+
+def decide(
+    vectors: Vectors, evidence: Sequence[Evidence], *, has_both: bool = False
+) -> ConventionFinding:
     """Test `vectors`, as which all motion in the evidence was read; frames are taken together.
 
     Every reading warps the neighbours; the one that leaves the least difference is meant. The
     stated one is kept unless another leaves less than _CLEARLY of its difference, and explains
-    _MATTERS more.
+    _MATTERS more. `has_both`: those to either side were stored, so one may be turned.
     """
     tested = [e for e in evidence if e.lookups]
+    tested = [e for e in tested if not e.is_below] or tested
+    is_zero = all(e.fastest <= _STILL for e in evidence if not e.doubt or e.fastest or e.is_below)
+    zero = ConventionFinding(vectors, False, f"{vectors}, {_ZERO}", notable=True)
     if not tested:
-        if evidence and all(e.zero for e in evidence) and any(e.differs for e in evidence):
-            return ConventionFinding(vectors, False, f"{vectors}, {_ZERO}", notable=True)
+        if evidence and all(e.is_below for e in evidence) and any(e.differs for e in evidence):
+            return zero
         doubts = [e.doubt for e in evidence if e.doubt] or ["no frame to test it on"]
         return ConventionFinding(vectors, False, f"{vectors}, by name ({doubts[-1]})")
     probes = _Probes(tested, _PROBES)
-    still = probes.difference("", 0.0)
+    still = probes.difference(_Reading(x=0.0, y=0.0))
     if still == 0:
         text = f"{vectors}, by name (moving parts look the same in all frames: not testable)"
         return ConventionFinding(vectors, False, text)
-    stated = probes.difference("", 1.0)
-    flip, scale, left = _best(tested, probes, vectors, stated)
+    stated = probes.difference(_STATED)
+    best, left = _best(tested, probes, vectors, stated, has_both)
     if left > min(_CLEARLY * stated, stated - _MATTERS * still):
-        flip, scale, left = "", 1.0, stated
+        best, left = _STATED, stated
     if left > _EXPLAINS * still:
+        if tested[0].is_below:
+            text = f"{vectors}, {_BELOW}"
+            return zero if is_zero else ConventionFinding(vectors, False, text, notable=True)
         text = f"{vectors}, by name; no interpretation of them predicts the neighbouring frame"
         return ConventionFinding(vectors, False, text + ": check them", notable=True)
-    if (flip, scale) == ("", 1.0):
+    if best == _STATED:
         text = (
             f"moved along them, the next frame matches ({left / still:.0%} of the difference left)"
         )
         return ConventionFinding(vectors, True, f"{vectors}, tested: {text}")
-    meant = replace(vectors, flip=_combine(vectors.flip, flip), scale=vectors.scale * scale)
-    shown = f"{meant} (vectors of {1 / scale:.3g} frames)" if scale != 1 else f"{meant}"
+    meant = best.of(vectors)
     why = f"{left / still:.0%} of the difference to the next frame is left along them"
-    text = f"{shown}, because {why}, and {stated / still:.0%} with {vectors}"
+    text = (
+        f"{meant}{_unit(best, tested[0])}, because {why}, and {stated / still:.0%} with {vectors}"
+    )
     return ConventionFinding(meant, True, text, notable=True)
 
 
+def _unit(reading: _Reading, evidence: Evidence) -> str:
+    """The unit that a reading gives the vectors, in words."""
+    if reading.x != reading.y:
+        if reading.unit in _FRACTIONS:
+            return {1.0: " (fractions of the picture)", 0.5: " (-1 to 1 over the picture)"}[
+                reading.unit
+            ]
+        return f" ({reading.unit:.3g} of the picture)"
+    if evidence.is_below:
+        return f" (1 is {reading.x:.4g} px)"
+    return f" (vectors of {1 / reading.x:.3g} frames)" if reading.x != 1 else ""
+
+
 def _best(
-    tested: Sequence[Evidence], probes: _Probes, vectors: Vectors, stated: float
-) -> tuple[str, float, float]:
-    """The flip and scale that are meant, and the difference that they leave."""
-    left = {("", 1.0): stated}
-    for flip, scale in _search(tested, probes):
-        left[flip, scale] = probes.difference(flip, scale)
+    tested: Sequence[Evidence], probes: _Probes, vectors: Vectors, stated: float, has_both: bool
+) -> tuple[_Reading, float]:
+    """The reading that is meant, and the difference that it leaves."""
+    left = {_STATED: stated}
+    for reading in _search(tested, probes, has_both):
+        left[reading] = probes.difference(reading)
     least = min(left.values())
     # Of readings that do as well (nothing moves along y, say) the plainest.
     best = min(
         (k for k, d in left.items() if d <= _ALIKE * least),
         key=lambda k: (
-            len(_combine(vectors.flip, k[0])),
-            k != ("", 1.0),
-            k[1] not in _PLAIN,
+            len(_combine(vectors.flip, k.flip)),
+            k.is_turned,
+            k != _STATED,
+            k.unit not in (_FRACTIONS if k.x != k.y else (*_PLAIN, *_POWERS)),
             left[k],
         ),
     )
-    return *best, left[best]
+    return best, left[best]
 
 
-def _search(tested: Sequence[Evidence], probes: _Probes) -> list[tuple[str, float]]:
+@dataclass(frozen=True, eq=False)
+class _Unit:
+    """A unit that vectors may have, of `x` and `y` [px]: the multiples of it that are tried."""
+
+    x: float
+    y: float
+    multiples: np.ndarray
+    plain: tuple[float, ...]
+
+
+def _units(evidence: Evidence) -> list[_Unit]:
+    """The units that the vectors of some frames may have."""
+    if not evidence.is_below:
+        return [_Unit(1.0, 1.0, _SCALES, _PLAIN)]
+    width, height = evidence.whole
+    span = np.log(width * 2) / np.log(_SCALES[1] / _SCALES[0])
+    lengths = np.geomspace(0.5, width, int(span) + 1) / max(evidence.fastest, _NOTHING)
+    found = [_Unit(1.0, 1.0, lengths, _POWERS)]
+    if width != height:
+        found.insert(0, _Unit(float(width), float(height), _SCALES, _FRACTIONS))
+    return found
+
+
+def _search(tested: Sequence[Evidence], probes: _Probes, has_both: bool) -> list[_Reading]:
     """Readings that may be meant: of each flip the best scale, if it does nearly as well as any.
 
     None if no reading is clearly better than the stated one.
     """
     few = _Probes(tested, _ROUGHLY)
-    rough = {flip: [few.difference(flip, s) for s in (1.0, *_SCALES)] for flip in _FLIPS}
+    turns = (False, True) if has_both else (False,)
+    rough = {
+        (unit, flip, turned): [
+            few.difference(_reading(unit, flip, scale, turned)) for scale in unit.multiples
+        ]
+        for unit in _units(tested[0])
+        for flip in _FLIPS
+        for turned in turns
+    }
     least = min(map(min, rough.values()))
-    if least > _HARDLY * rough[""][0]:
+    if least > _HARDLY * few.difference(_STATED):
         return []
     most, found = _NEARBY * least, []
-    for flip, differences in rough.items():
-        if min(differences) > most:
-            continue
-        found.append((flip, 1.0))
-        middle = float((1.0, *_SCALES)[int(np.argmin(differences))])
-        step = float(_SCALES[1] / _SCALES[0])
-        scale = _golden(
-            lambda s, flip=flip: probes.difference(flip, s), middle / step, middle * step
-        )
-        plain = min(_PLAIN, key=lambda p: abs(np.log(p / scale)))
-        near = abs(np.log(plain / scale)) < np.log(step)
-        found += [(flip, float(f"{scale:.3g}"))] + ([(flip, plain)] if near else [])
+    for (unit, flip, turned), differences in rough.items():
+        if min(differences) <= most:
+            middle = float(unit.multiples[int(np.argmin(differences))])
+            found += _refined(probes, unit, flip, turned, middle)
     return found
+
+
+def _refined(
+    probes: _Probes, unit: _Unit, flip: str, turned: bool, middle: float
+) -> list[_Reading]:
+    """Readings with the best multiple of a unit near `middle`, as it is, and a plain one."""
+    step = float(unit.multiples[1] / unit.multiples[0])
+    scale = _golden(
+        lambda s: probes.difference(_reading(unit, flip, s, turned)), middle / step, middle * step
+    )
+    found = [_reading(unit, flip, float(f"{scale:.3g}"), turned)]
+    if (unit.x, unit.y) == (1, 1):
+        found.append(_reading(unit, flip, 1.0, turned))
+    plain = min(unit.plain, key=lambda p: abs(np.log(p / scale)))
+    if abs(np.log(plain / scale)) < np.log(step):
+        found.append(_reading(unit, flip, plain, turned))
+    return found
+
+
+def _reading(unit: _Unit, flip: str, scale: float, turned: bool) -> _Reading:
+    return _Reading(flip, unit.x * scale, unit.y * scale, scale, turned)
 
 
 def _golden(difference: Callable[[float], float], low: float, high: float) -> float:
@@ -215,29 +324,39 @@ class _Probes:
     def __init__(self, tested: Sequence[Evidence], most: int):
         each = most // len(tested)
         self._lookups = [
-            (*(array[:each] for array in arrays), tones)
+            (side, *(array[:each] for array in arrays), tones)
             for e in tested
-            for *arrays, tones in e.lookups
+            for side, (*arrays, tones) in zip(e.sides, e.lookups, strict=True)
         ]
 
-    def difference(self, flip: str, scale: float) -> float:
+    def difference(self, reading: _Reading) -> float:
         """Mean difference of warped neighbours, robust against what appears and disappears."""
-        factor = np.array([-scale if axis in flip else scale for axis in "xy"], np.float32)
+        scales = zip("xy", (reading.x, reading.y), strict=True)
+        factor = np.array([-s if axis in reading.flip else s for axis, s in scales], np.float32)
         total, count = 0.0, 0
-        for here, at, motion, neighbour in self._lookups:
-            there = _bilinear(neighbour, at + motion * factor)
+        for side, here, at, motion, neighbour in self._lookups:
+            turned = -factor if reading.is_turned and side < 0 else factor
+            there = _bilinear(neighbour, at + motion * turned)
             total += float(np.minimum(np.abs(there - here).sum(axis=1), _MOST).sum())
             count += len(here)
         return total / count
 
 
-def _moving_pixels(motions: Sequence[np.ndarray]) -> np.ndarray:
-    """Up to _PROBES pixels (y, x), in random order, that move in every given direction."""
-    moving = np.ones(motions[0].shape[:2], bool)
+def _speeds(motions: Sequence[np.ndarray]) -> np.ndarray:
+    """(height, width) length of the shortest of several motions; 0 where one is not finite."""
     with np.errstate(all="ignore"):
-        for motion in motions:
-            speed = np.hypot(motion[..., 0], motion[..., 1])
-            moving &= (speed > _MOVING) & np.isfinite(speed)
+        speeds = np.stack([np.hypot(m[..., 0], m[..., 1]) for m in motions])
+    return np.where(np.isfinite(speeds).all(axis=0), speeds.min(axis=0), 0)
+
+
+def _fastest(speeds: np.ndarray, moving: np.ndarray) -> float:
+    """Length of the longest vectors but a few; of the fastest where only a few move."""
+    top = float(np.quantile(speeds, _TOP))
+    return top if top > _NOTHING or len(moving) else float(speeds.max())
+
+
+def _some(moving: np.ndarray) -> np.ndarray:
+    """Up to _PROBES of the pixels (y, x) that move, in random order."""
     at = np.argwhere(moving)
     return at[np.random.default_rng(0).permutation(len(at))[:_PROBES]]
 

@@ -1,96 +1,40 @@
 """Motion vectors as programs write them -> to_prev, to_next in pixels, y down.
 
-Foreign conventions end here. A convention is what the numbers mean; detect.py finds out whether
-they do.
+Foreign conventions end here. A convention is what the numbers mean; vector_test.py finds out
+whether they do.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import InputError, check_choice
+from ...io.data_files import Unit
+from .conventions import CONVENTIONS, STEMS, Convention
 from .names import (
     MissingLayerError,
     component,
+    ending,
+    is_of_space,
+    is_whole,
     layers,
     one_channel,
     pick,
     stem,
 )
 
-
-@dataclass(frozen=True)
-class Convention:
-    """A program's convention. `signs` turn its vectors into displacements [px], y down."""
-
-    about: str
-    stems: tuple[str, ...]  # last part of the layer's name, lower case
-    prev: tuple[int, int] | None  # which components lead to the previous frame
-    next: tuple[int, int] | None
-    prev_sign: tuple[int, int] = (1, 1)
-    next_sign: tuple[int, int] = (1, 1)
-    components: tuple[str, ...] = ()  # the layer must have these, if any are named
-    offset: float = 0.0  # what stands for no motion
-
-
-CONVENTIONS: dict[str, Convention] = {
-    "blender": Convention(
-        "Vector pass: pixels, y up; XY = P(n-1) - P(n), ZW = P(n) - P(n+1)",
-        ("vector",),
-        (0, 1),
-        (2, 3),
-        (1, -1),
-        (-1, 1),
-        ("x", "y", "z", "w"),
-    ),
-    "nuke": Convention(
-        "forward.u/v to the next, backward.u/v to the previous frame: pixels, y up",
-        ("forward", "backward"),
-        (0, 1),
-        (0, 1),
-        (1, -1),
-        (1, -1),
-    ),
-    "arnold": Convention(
-        "motionvector: pixels to the next frame, y up; scale by 2 if rendered for half a frame",
-        ("motionvector", "motion_vector"),
-        None,
-        (0, 1),
-        (1, -1),
-        (1, -1),
-    ),
-    "vray": Convention(
-        "velocity: pixels to the next frame, y up, 0.5 added; scale by 2 x max velocity if clamped",
-        ("velocity", "vrayvelocity"),
-        None,
-        (0, 1),
-        (1, -1),
-        (1, -1),
-        ("r", "g"),
-        0.5,
-    ),
-    "rsmb": Convention(
-        "0..1, 0.5 is no motion, y up, to the next frame; scale by 2 x MaxDisplace",
-        ("rsmb", "mv2dtoxik", "mv2d", "lm_2dmv"),
-        None,
-        (0, 1),
-        (1, -1),
-        (1, -1),
-        (),
-        0.5,
-    ),
-    "plain": Convention(
-        "to_prev.x/y, to_next.x/y or velocity.x/y (to the next frame): pixels, y down",
-        ("to_prev", "to_next", "velocity", "motion", "motionvectors"),
-        (0, 1),
-        (0, 1),
-    ),
-}
-STEMS = frozenset(stem for convention in CONVENTIONS.values() for stem in convention.stems)
-_BACKWARD = ("backward", "to_prev")
+_BACKWARD = ("backward", "toprev", "motionback", "backvector", "backwardvector", "backwardflow")
+_PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?(?P<axis>[xyuvXYUV])")
+_UNIT = 0.02  # from 1: the length of a unit vector, in half floats
+_MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
+_WIDE = 0.25  # from the middle: where the median of numbers lies that are stored around it
+NOWHERE = 1e4
+"""Numbers from here on, either way, stand for no vector: Blender writes 10000 where nothing was
+rendered, .flo files 1e9 where the flow is unknown."""
 _VALID = ("mv_alpha", "mvalpha")  # layers or channels, after RE:Vision Effects' MV_Alpha
 _FULL = 0.999  # of the mask: vectors are valid
 _AROUND = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
@@ -102,63 +46,177 @@ class Vectors:
 
     `convention`: "auto", "none" or a name in CONVENTIONS. `layer`: name of a layer that cannot be
     found automatically. `offset`, the value that encodes zero motion, is subtracted first, then
-    `scale` multiplies; `flip` reverses "x", "y" or "xy". `mask`: layer that is 1 where the vectors
-    are valid, or "none"; by default one called MV_Alpha, or the alpha of rsmb's vectors.
+    `scale` multiplies, or one for x and one for y; `flip` reverses "x", "y" or "xy". `mask`: layer
+    that is 1 where the vectors are valid, or "none"; by default one called MV_Alpha, or the alpha
+    of rsmb's vectors. `turned`: those to the previous frame lead from it.
     """
 
     convention: str = "auto"
     layer: str | None = None
-    scale: float = 1.0
+    scale: float | tuple[float, float] = 1.0
     offset: float | None = None
     flip: str = ""
     mask: str | None = None
+    turned: bool = False
 
     def __post_init__(self) -> None:
         check_choice("vectors", self.convention, ("auto", *CONVENTIONS, "none"))
         if self.flip not in ("", "x", "y", "xy"):
             raise InputError(f"vector flip must be x, y or xy, got {self.flip!r}")
-        if not np.isfinite(self.scale) or not np.isfinite(self.offset or 0.0):
+        if not np.isfinite(self.scales).all() or not np.isfinite(self.offset or 0.0):
             raise InputError("vector scale and offset must be finite")
 
+    @property
+    def scales(self) -> tuple[float, float]:
+        """The factors of x and y."""
+        return self.scale if isinstance(self.scale, tuple) else (self.scale, self.scale)
+
+    def scaled(self, x: float, y: float) -> Vectors:
+        """The same vectors, read so many times as long along x and y."""
+        x, y = (round(own * more, 9) for own, more in zip(self.scales, (x, y), strict=True))
+        return replace(self, scale=x if x == y else (x, y))
+
+    @property
+    def middle(self) -> float:
+        """The number that stands for no motion."""
+        return CONVENTIONS[self.convention].offset if self.offset is None else self.offset
+
     def __str__(self) -> str:
-        more = [f"scale {self.scale:g}"] if self.scale != 1 else []
+        x, y = self.scales
+        more = [f"scale {x:g}" if x == y else f"scale {x:g},{y:g}"] if (x, y) != (1, 1) else []
         more += [f"offset {self.offset:g}"] if self.offset is not None else []
         more += [f"flip {self.flip}"] if self.flip else []
+        more += ["previous turned"] if self.turned else []
         more += [f"mask {self.mask}"] if self.mask else []
         return " ".join((self.convention, *more))
 
 
-def named(names: Iterable[str], wanted: Vectors, near: str | None = None) -> Vectors | None:
+def named(
+    names: Iterable[str],
+    wanted: Vectors,
+    near: str | None = None,
+    units: Mapping[str, Unit] | None = None,
+) -> Vectors | None:
     """`wanted` with "auto" replaced by the convention the layers' names speak for.
 
-    Layers beside the channel `near` come first. None: "none", or no name speaks for any.
+    Layers beside the channel `near` come first, and before all those of which their file tells the
+    unit, in `units`. None: "none", or no name speaks for any.
     """
     if wanted.convention == "none":
         return None
     if wanted.convention != "auto":
         return wanted
-    by_layer = layers(names, near)
+    by_layer = _layers(names, near)
     if wanted.layer is not None:
         only = pick(by_layer, wanted.layer, "vector layer")
         by_layer = {only: by_layer[only]}
+    if wanted.scale == 1 and wanted.offset is None:
+        for layer, unit in (units or {}).items():
+            if layer in by_layer:
+                form = "rsmb" if unit.is_up else "plain"
+                return replace(wanted, convention=form, layer=layer, scale=unit.px,
+                               offset=None if unit.is_up else unit.still)  # fmt: skip
     for name, convention in CONVENTIONS.items():
         if _find(by_layer, convention):
             return replace(wanted, convention=name)
     return replace(wanted, convention="plain") if wanted.layer is not None else None
 
 
-def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str, list[str]]:
-    """The layers of a convention, by stem."""
-    found: dict[str, list[str]] = {}
-    for layer, members in by_layer.items():
-        fits = len(members) >= 2
-        if convention.components:
-            fits = [component(m) for m in members][: len(convention.components)] == list(
-                convention.components
-            )
-        if stem(layer) in convention.stems and fits:
-            found.setdefault(stem(layer), members)
+def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> list[str]:
+    """Layers that may hold vectors under a name that does not say so.
+
+    They have two channels, or three, with negative numbers, and are neither unit vectors nor called
+    as something else.
+    """
+    found = []
+    for layer, members in layers(channels, near).items():
+        if not layer or len(members) not in (2, 3) or is_of_space(layer):
+            continue
+        planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
+        with np.errstate(all="ignore"):
+            lengths = np.sqrt((planes**2).sum(axis=0))
+            is_unit = np.abs(lengths - 1) < _UNIT
+            if (planes < 0).any() and (is_unit | (lengths == 0)).mean() < _MOSTLY:
+                found.append(layer)
     return found
+
+
+def named_as_flow(planes: Mapping[str, np.ndarray], title: str) -> dict[str, np.ndarray]:
+    """Channels of a flow file of this title, u and v [px], y down, by names that say so."""
+    words = ending(title, ("backward", "bwd", "back", "prev", "toprev", *_BACKWARD))
+    layer = "to_prev" if words else "to_next"
+    return {f"{title}.{layer}.{name}" if title else name: p for name, p in planes.items()}
+
+
+def _layers(names: Iterable[str], near: str | None) -> dict[str, list[str]]:
+    """Channels by layer; also of layers whose names stand before X and Y, as in `BackVectorX`."""
+    names = list(names)
+    found, pairs = layers(names, near), dict[str, list[str]]()
+    for name in sorted(names):
+        if (m := _PAIR.fullmatch(name)) and ending(m["stem"], STEMS):
+            pairs.setdefault(".".join(filter(None, (m["layer"], m["stem"]))), []).append(name)
+    return found | {k: members for k, members in pairs.items() if len(members) == 2}
+
+
+def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str, list[str]]:
+    """The layers of a convention, by stem; those that are called so alone come first."""
+    found: dict[str, list[str]] = {}
+    fitting: list[tuple[str, str]] = []
+    for layer, members in by_layer.items():
+        own = ending(layer, convention.stems)
+        wanted = list(convention.components)
+        has = [component(m) for m in members][: len(wanted)]
+        if own and len(members) >= 2 and has == wanted and not is_of_space(layer, own):
+            fitting.append((layer, own))
+    for layer, own in sorted(fitting, key=lambda one: not is_whole(*one)):
+        found.setdefault(own, by_layer[layer])
+    return found
+
+
+def in_pixels(vectors: Vectors, whole: tuple[int, int]) -> Vectors:
+    """`vectors`, of which fractions of the picture get its width and height as their scale."""
+    return vectors.scaled(*whole) if CONVENTIONS[vectors.convention].of_picture else vectors
+
+
+def settled(
+    channels: Mapping[str, np.ndarray],
+    vectors: Vectors,
+    whole: tuple[int, int],
+    near: str | None = None,
+) -> Vectors:
+    """`vectors`, as `named` found them, with what their numbers say, in pixels of `whole`.
+
+    Numbers from 0 to 1 around 0.5 have 0.5 for no motion, whatever their layer is called; numbers
+    on both sides of 0 have 0.
+    """
+    vectors = in_pixels(vectors, whole)
+    sides = channels_of(channels, vectors, near)
+    if vectors.offset is not None or vectors.convention == "blender":
+        return vectors
+    planes = np.stack(
+        [channels[name][::3, ::3].ravel() for pair in sides.values() for name in pair]
+    )
+    planes = planes[:, np.isfinite(planes).all(axis=0) & planes.any(axis=0)].astype(np.float32)
+    if not planes.size:
+        return vectors
+    if vectors.middle:
+        return replace(vectors, offset=0.0) if _is_around(planes, 0, _WIDE) else vectors
+    if planes.min() < 0 or planes.max() > 1 or not _is_around(planes, 0.5, _WIDE):
+        return vectors
+    if list(sides) != ["next"]:
+        return replace(vectors, offset=0.5)
+    return replace(vectors, convention="rsmb", layer=_layer_of(channels, sides["next"], near))
+
+
+def _is_around(planes: np.ndarray, middle: float, most: float) -> bool:
+    """Return True if the medians of all planes are near `middle`, and numbers lie on both sides."""
+    apart = planes - np.float32(middle)
+    is_near = np.abs(np.median(apart, axis=1)) < most
+    return bool(is_near.all()) and bool(apart.min() < 0 < apart.max())
+
+
+def _layer_of(names: Iterable[str], pair: tuple[str, str], near: str | None) -> str:
+    return next(k for k, members in _layers(names, near).items() if set(pair) <= set(members))
 
 
 def channels_of(
@@ -166,7 +224,7 @@ def channels_of(
 ) -> dict[str, tuple[str, str]]:
     """The x and y channels for "prev" and "next"; one of them may not be there."""
     convention = CONVENTIONS[vectors.convention]
-    by_layer = layers(names, near)
+    by_layer = _layers(names, near)
     if vectors.layer is not None:
         members = by_layer[pick(by_layer, vectors.layer, "vector layer")]
         sides = [("next", convention.next)]
@@ -175,7 +233,10 @@ def channels_of(
         found = [(side, members, where) for side, where in sides if where]
     else:
         found = []
-        for name, members in _find(by_layer, convention).items():
+        there = _find(by_layer, convention)
+        if not there and not any(_find(by_layer, c) for c in CONVENTIONS.values() if c.components):
+            there = _find(by_layer, CONVENTIONS["plain"])  # names of no program's own
+        for name, members in there.items():
             if convention.prev and convention.prev != convention.next:
                 found += [("prev", members, convention.prev), ("next", members, convention.next)]
             elif name in _BACKWARD:
@@ -184,7 +245,7 @@ def channels_of(
                 found.append(("next", members, convention.next))
     if not found:
         raise MissingLayerError(
-            f"no {vectors.convention} vectors ({' or '.join(convention.stems)}); "
+            f"no {vectors.convention} vectors ({' or '.join(convention.stems[:6])}); "
             f"available: {', '.join(map(repr, by_layer))}"
         )
     result: dict[str, tuple[str, str]] = {}
@@ -206,25 +267,45 @@ def read(
     """
     convention = CONVENTIONS[vectors.convention]
     sides = channels_of(channels, vectors, near)
-    offset = convention.offset if vectors.offset is None else vectors.offset
     flip = np.array([-1 if axis in vectors.flip else 1 for axis in "xy"], np.float32)
     signs = {"prev": convention.prev_sign, "next": convention.next_sign}
+    mask = mask_of(channels, vectors, near)
 
     first = channels[next(iter(sides.values()))[0]]
     motion = np.moveaxis(np.empty((4, *first.shape), np.float32), 0, 2)
     for side, (begin, other) in (("prev", (0, 2)), ("next", (2, 0))):
         if side not in sides:
             continue
-        factor = np.float32(vectors.scale) * flip * np.array(signs[side], np.float32)
+        factor = np.array(vectors.scales, np.float32) * flip * np.array(signs[side], np.float32)
+        factor *= -1 if vectors.turned and side == "prev" else 1
+        nowhere = _nowhere(channels, sides[side], vectors.middle == 0.5 and not mask)
         for axis, name in enumerate(sides[side]):
             plane = motion[..., begin + axis]
-            np.subtract(channels[name], np.float32(offset), out=plane)
+            np.subtract(channels[name], np.float32(vectors.middle), out=plane)
             plane *= factor[axis]
+            if nowhere is not None:
+                plane[nowhere] = 0
         if len(sides) == 1:
             np.negative(motion[..., begin : begin + 2], out=motion[..., other : other + 2])
-    if mask := mask_of(channels, vectors, near):
+    if mask:
         _mask_out(motion, channels[mask], vectors.mask is not None)
     return motion
+
+
+def _nowhere(
+    channels: Mapping[str, np.ndarray], names: Iterable[str], is_black: bool
+) -> np.ndarray | None:
+    """Pixels whose numbers stand for no vector; None if that is nowhere. NaN is left to Frame.bad.
+
+    `is_black`: so do two zeros, which an image has where nothing was drawn.
+    """
+    planes = [channels[name] for name in names]
+    if is_black:
+        return ~np.any(planes, axis=0)
+    with np.errstate(invalid="ignore"):
+        if all(max(p.max(initial=0), -p.min(initial=0)) < NOWHERE for p in planes):
+            return None
+        return np.any([(np.abs(p) >= NOWHERE) & np.isfinite(p) for p in planes], axis=0)
 
 
 def mask_of(names: Iterable[str], vectors: Vectors, near: str | None = None) -> str | None:

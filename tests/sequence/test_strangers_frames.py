@@ -1,0 +1,410 @@
+"""Frames as other programs write them: vectors in files, units and under names of their own."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+import tifffile
+
+import make_frames as make
+from wgmb import Clip, InputError, Passes, Vectors
+from wgmb.io import data_files
+from wgmb.sequence.layers import vectors
+
+NUMBERS = (4, 5, 6)
+SIZE = np.array([make.WIDTH, make.HEIGHT], "f4")
+UP = np.array([1, -1], "f4")
+
+
+def png(path, samples: np.ndarray):
+    """(height, width, 1 or 3 or 4) uint8 or uint16 as a PNG, written without wgmb."""
+    height, width, count = samples.shape
+    rows = samples.astype(samples.dtype.newbyteorder(">"))
+    raw = b"".join(b"\0" + row.tobytes() for row in rows)
+    kind = {1: 0, 3: 2, 4: 6}[count]
+    head = struct.pack(">IIBBBBB", width, height, 8 * samples.itemsize, kind, 0, 0, 0)
+    chunks = (b"IHDR", head), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        for name, data in chunks
+    ))  # fmt: skip
+    return path
+
+
+def in_bits(values: np.ndarray, kind) -> np.ndarray:
+    return np.rint(np.clip(values, 0, 1) * np.iinfo(kind).max).astype(kind)
+
+
+def three(a: np.ndarray, third=0.0) -> np.ndarray:
+    return np.dstack([a, np.full(a.shape[:2], third, "f4")])
+
+
+def to_next(n: int) -> np.ndarray:
+    return make.motion(n)[1]
+
+
+def rgb(image: np.ndarray, layer: str = "", kind="f4") -> dict[str, np.ndarray]:
+    lead = f"{layer}." if layer else ""
+    return {
+        f"{lead}{c}": image[..., i].astype(kind) for i, c in enumerate("RGBA"[: image.shape[2]])
+    }
+
+
+def beauty(folder, numbers=NUMBERS, **more):
+    """Frames with nothing but the picture, and `more` channels by name; their pattern."""
+    for n in numbers:
+        channels = make.colors(make.picture(n)) | {k: f(n) for k, f in more.items()}
+        make.write_exr(folder / f"beauty.{n:04d}.exr", channels)
+    return folder / "beauty.####.exr"
+
+
+def of_layers(folder, layers, kind="f4"):
+    """Frames with the picture and further channels, of which `layers(n)` has (h, w, 2)."""
+    for n in NUMBERS:
+        channels = make.colors(make.picture(n))
+        for names, plane in layers(n).items():
+            for name, values in zip(names.split(","), np.moveaxis(plane, 2, 0), strict=True):
+                channels[name] = values.astype(kind)
+        make.write_exr(folder / f"s.{n:04d}.exr", channels)
+    return folder / "s.####.exr"
+
+
+def motion_of(clip: Clip, n: int = 5) -> np.ndarray:
+    return clip.frame(clip.source(n)).motion
+
+
+def is_right(clip: Clip, most: float, n: int = 5) -> None:
+    """The motion is that of `make`, to `most` px."""
+    np.testing.assert_allclose(motion_of(clip, n)[..., 2:], to_next(n), atol=most)
+
+
+# ---- one layer a file -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("vectors_in", "depth_in", "mask_in"),
+    [
+        ("motionvector.####.exr", "depth.####.exr", "matte.####.exr"),
+        ("beauty_motionvector.####.exr", "beauty_Z.####.exr", "beauty_matte.####.exr"),
+        ("mv/beauty.####.exr", "Z/beauty.####.exr", "matte/beauty.####.exr"),
+        ("s010.Motion Vector_v2.####.exr", "s010.VRayZDepth.####.exr", "s010.matte.####.exr"),
+    ],
+)
+def test_a_layer_a_file_is_called_as_its_file(tmp_path, vectors_in, depth_in, mask_in, capsys):
+    mask = np.random.default_rng(0).random((make.HEIGHT, make.WIDTH)).astype("f4")
+    for n in NUMBERS:
+        depth = np.full((make.HEIGHT, make.WIDTH, 3), 7, "f4")
+        made = three(to_next(n) * UP), depth, np.dstack([mask] * 3)
+        for name, image in zip((vectors_in, depth_in, mask_in), made, strict=True):
+            path = tmp_path / name.replace("####", f"{n:04d}")
+            path.parent.mkdir(exist_ok=True)
+            make.write_exr(path, rgb(np.dstack([image, mask])))
+    also = tuple(str(tmp_path / name) for name in (vectors_in, depth_in, mask_in))
+    clip = Clip(beauty(tmp_path), passes=Passes(also=also, holdout="matte"))
+    (frame,) = Clip(tmp_path / "beauty.####.exr", frames="5", passes=clip.passes)
+    np.testing.assert_array_equal(frame.color, make.picture(5).astype("f2"))
+    np.testing.assert_array_equal(frame.motion[..., 2:], to_next(5))
+    assert np.all(frame.depth == 7).all()
+    np.testing.assert_array_equal(frame.holdout, mask)
+    line = [word for name in also for word in ("--also", name)]
+    code, out, _ = make.inside(capsys, "info", clip.pattern, *line)
+    assert code == 0
+    assert out.count("layer ") == 4
+    assert "vectors   none" not in out
+    assert "depth     none" not in out
+
+
+def test_passes_of_light_in_files_of_their_own_are_found(tmp_path):
+    light = {"diffuse_direct": 0.5, "diffuse_albedo": 0.25}
+    for name, value in light.items():
+        for n in NUMBERS:
+            make.write_exr(tmp_path / f"shot_{name}.{n:04d}.exr", rgb(0 * make.picture(n) + value))
+    also = tuple(str(tmp_path / f"shot_{name}.####.exr") for name in light)
+    clip = Clip(beauty(tmp_path), passes=Passes(also=also))
+    frame = clip.frame(clip.source(5))
+    np.testing.assert_allclose(frame.diffuse_light, 2)
+    np.testing.assert_allclose(frame.diffuse_color, 0.25)
+
+
+def test_a_layer_that_is_in_both_files_keeps_its_name_in_the_pictures(tmp_path):
+    zero, own = np.zeros((make.HEIGHT, make.WIDTH), "f4"), {"mask.R": lambda n: zero + n}
+    for n in NUMBERS:
+        make.write_exr(tmp_path / f"more.{n:04d}.exr", {"mask.R": zero + 0.5, "other.R": zero})
+    clip = Clip(beauty(tmp_path, **own), passes=Passes(also=(str(tmp_path / "more.####.exr"),)))
+    channels = clip.source(5).channels
+    assert channels["mask.R"][0, 0] == 5
+    assert channels["more.mask.R"][0, 0] == 0.5
+    assert "other.R" in channels
+
+
+def test_the_picture_is_not_read_as_vectors(tmp_path, capsys):
+    pattern = beauty(tmp_path)
+    line = "blur", pattern, "-o", tmp_path / "o.####.exr", "--vector-layer", ""
+    code, out, err = make.inside(capsys, *line)
+    assert code != 0
+    assert "G, R of the picture itself" in out + err
+    assert "--vector-layer" in err
+    assert not list(tmp_path.glob("o*"))
+
+
+# ---- stills that hold numbers ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("most", [16.0, 64.0])
+@pytest.mark.parametrize(("form", "kind"), [("png", "u1"), ("png", "u2"), ("tif", "u2")])
+def test_motion_around_half_is_found_with_its_unit(tmp_path, form, kind, most):
+    """As After Effects and ReelSmart Motion Blur take it: y up, 1 is a motion of `most` px."""
+    for n in NUMBERS:
+        samples = in_bits(three(0.5 + to_next(n) * UP / (2 * most)), np.dtype(kind).type)
+        path = tmp_path / f"shot_mv.{n:04d}.{form}"
+        png(path, samples) if form == "png" else tifffile.imwrite(path, samples, photometric="rgb")
+    also = (str(tmp_path / f"shot_mv.####.{form}"),)
+    clip = Clip(beauty(tmp_path), passes=Passes(also=also))
+    is_right(clip, most / 100 if kind == "u1" else 0.05)
+    told = Clip(tmp_path / "beauty.####.exr",
+                passes=Passes(also=also, vectors=Vectors("rsmb", scale=2 * most)))  # fmt: skip
+    is_right(told, 2 * most / np.iinfo(kind).max)
+    assert (motion_of(told)[0, -1] == 0).all()  # the middle of whole numbers does not move
+
+
+def test_where_nothing_was_drawn_vectors_around_half_do_not_move(tmp_path):
+    for n in NUMBERS:
+        samples = in_bits(three(0.5 + to_next(n) * UP / 64), np.uint16)
+        png(tmp_path / f"mv.{n:04d}.png", samples * to_next(n).any(axis=2, keepdims=True))
+    is_right(Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "mv.####.png"),))), 0.05)
+
+
+@pytest.mark.parametrize("form", ["png", "tif", "exr", "flo"])
+def test_what_wgmb_writes_for_other_programs_comes_back(tmp_path, capsys, form):
+    pattern = make.write_sequence(tmp_path, NUMBERS, "nuke")
+    out = tmp_path / f"mv.####.{form}"
+    line = () if form == "flo" else ("--as", "rsmb", "--max-displace", "100")
+    assert make.inside(capsys, "vectors", pattern, "-o", out, *line, "-q") == (0, "", "")
+    step = {"exr": 1e-4, "flo": 0}.get(form, 200 / 65535)
+    clip = Clip(beauty(tmp_path), passes=Passes(also=(str(out),)))
+    for n in NUMBERS:
+        is_right(clip, step, n)
+    assert not clip.is_finding_notable
+    code, said, _ = make.inside(capsys, "info", clip.pattern, "--also", out)
+    assert code == 0
+    assert "tested" in said
+
+
+def test_a_flow_file_of_the_other_direction_says_so_by_its_name(tmp_path):
+    for n in NUMBERS:
+        for name, flow in (("flow_fwd", to_next(n)), ("flow_bwd", make.motion(n)[0])):
+            (tmp_path / f"{name}.{n:04d}.flo").write_bytes(data_files.encode_flo(flow))
+    also = tuple(str(tmp_path / f"flow_{way}.####.flo") for way in ("bwd", "fwd"))
+    clip = Clip(beauty(tmp_path), passes=Passes(also=also))
+    np.testing.assert_array_equal(motion_of(clip), np.dstack(make.motion(5)))
+    sides = vectors.channels_of(clip.source(5).channels, Vectors("plain"))
+    assert {side: x.split(".")[0] for side, (x, _) in sides.items()} == {
+        "prev": "flow_bwd", "next": "flow_fwd"}  # fmt: skip
+
+
+def test_unknown_flow_is_no_motion(tmp_path):
+    for n in NUMBERS:
+        flow = to_next(n)
+        flow[:5] = 1e10
+        (tmp_path / f"flow.{n:04d}.flo").write_bytes(data_files.encode_flo(flow))
+    got = motion_of(Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "flow.####.flo"),))))
+    assert (got[:5] == 0).all()
+    np.testing.assert_array_equal(got[5:, :, 2:], to_next(5)[5:])
+
+
+HEAD = struct.pack("<fii", 202021.25, 4, 3)
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [(b"", "begin"), (b"PIEH" + 8 * b"\0", "0 x 0"), (HEAD + 95 * b"\0", "108 bytes, got 107"),
+     (HEAD + 97 * b"\0", "108 bytes, got 109"), (b"PIEX" + HEAD[4:] + 96 * b"\0", "begin"),
+     (HEAD[:4] + struct.pack("<ii", -1, 4), "-1 x 4"),
+     (HEAD[:4] + struct.pack("<ii", 30000, 30000), "7200000012 bytes, got 12")],
+)  # fmt: skip
+def test_a_damaged_flow_file_is_one_line_with_its_name(tmp_path, data, text):
+    (tmp_path / "a.flo").write_bytes(data)
+    with pytest.raises(InputError, match=rf"a\.flo.*{text}"):
+        data_files.read_flo(tmp_path / "a.flo")
+    with pytest.raises(InputError, match="no such file"):
+        data_files.read_flo(tmp_path / "b.flo")
+
+
+def test_a_flow_file_is_not_resumed_as_it_holds_no_record(tmp_path, capsys):
+    pattern = make.write_sequence(tmp_path, (1, 2), "nuke")
+    line = "vectors", pattern, "-o", tmp_path / "f.####.flo"
+    assert make.inside(capsys, *line)[0] == 0
+    assert (tmp_path / "f.0001.flo").stat().st_size == 12 + 8 * make.WIDTH * make.HEIGHT
+    code, _, err = make.inside(capsys, *line, "--resume")
+    assert code == 2
+    assert "--resume needs the record" in err
+    code, _, err = make.inside(capsys, "vectors", pattern, "-o", tmp_path / "f.####.png")
+    assert code == 2
+    assert "--as is missing" in err
+
+
+def test_kittis_flow_is_read_with_its_mask(tmp_path):
+    for n in NUMBERS:
+        samples = np.rint(three(to_next(n) * 64 + 32768, 1)).astype("u2")
+        samples[:3] = 0
+        png(tmp_path / f"flow.{n:04d}.png", samples)
+    clip = Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "flow.####.png"),)))
+    is_right(clip, 1 / 128)
+    assert clip.vector_mask(clip.source(5)) == "flow.MV_Alpha"
+    assert not clip.is_finding_notable
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_floats_of_a_tiff_are_pixels(tmp_path, count):
+    for n in NUMBERS:
+        image = three(to_next(n))[..., :count]
+        more = {"photometric": "rgb"} if count == 3 else {"planarconfig": "contig"}
+        tifffile.imwrite(tmp_path / f"mv.{n:04d}.tif", image, **more)
+    is_right(Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "mv.####.tif"),))), 0)
+
+
+def test_colour_in_a_still_is_light_and_a_mask_is_not(tmp_path):
+    level = np.full((make.HEIGHT, make.WIDTH, 3), 128, "u1")
+    for n in NUMBERS:
+        png(tmp_path / f"matte.{n:04d}.png", level[..., :1])
+        png(tmp_path / f"DiffCol.{n:04d}.png", level)
+    also = tuple(str(tmp_path / f"{name}.####.png") for name in ("matte", "DiffCol"))
+    clip = Clip(beauty(tmp_path), passes=Passes(also=also, holdout="matte"))
+    source = clip.source(5)
+    np.testing.assert_allclose(clip.frame(source).holdout, 0.5)
+    np.testing.assert_allclose(source.channels["DiffCol.R"], 0.2159, atol=1e-3)
+
+
+# ---- units ----------------------------------------------------------------------------------
+
+UNITS = {  # numbers of a motion to the next frame [px, y down]: as programs write them
+    "fractions": (lambda v: v / SIZE, "motion.x,motion.y", "(fractions of the picture)"),
+    "fractions, y up": (lambda v: UP * v / SIZE, "_MotionVectors.R,_MotionVectors.G", "flip y"),
+    "-1 to 1, y up": (lambda v: 2 * UP * v / SIZE, "velocity.x,velocity.y", "(-1 to 1 over"),
+    "-1 to 1, backwards": (lambda v: -2 * v / SIZE, "mv.R,mv.G", "flip xy"),
+    "Unreal": (lambda v: UP * v / SIZE + 0.5,
+               "FinalImageMovieRenderQueue_MotionVectors.R,"
+               "FinalImageMovieRenderQueue_MotionVectors.G", "unreal scale 64,48"),
+    "0 to 1 of the picture": (lambda v: UP * v / SIZE + 0.5, "MotionVectors.R,MotionVectors.G",
+                              "rsmb scale 64,48 (fractions"),
+    "of the longest motion": (lambda v: UP * v / 32 + 0.5, "Motion vector.R,Motion vector.G",
+                              "(1 is 32 px)"),
+    "clamped velocity": (lambda v: UP * v / 40 + 0.5, "velocity.R,velocity.G", "vray scale "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["f2", pytest.param("f4", marks=pytest.mark.full)])
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
+    numbers, names, text = UNITS[unit]
+    clip = Clip(of_layers(tmp_path, lambda n: {names: numbers(to_next(n))}, kind))
+    assert text in clip.finding
+    is_right(clip, 0.05)
+
+
+def test_unreals_unit_is_known_by_its_name(tmp_path):
+    numbers, names, _ = UNITS["Unreal"]
+    path = of_layers(tmp_path, lambda n: {names: numbers(to_next(n))})
+    for n in (4, 6):
+        (tmp_path / f"s.{n:04d}.exr").unlink()
+    is_right(Clip(path), 1e-5)
+
+
+def test_two_scales_are_given(tmp_path, capsys):
+    names = "strange.x,strange.y"
+    pattern = of_layers(tmp_path, lambda n: {names: to_next(n) / (16, 8)})
+    told = Vectors("plain", layer="strange", scale=(16.0, 8.0))
+    is_right(Clip(pattern, passes=Passes(vectors=told)), 0)
+    line = "info", pattern, "--vectors", "plain", "--vector-layer", "strange", "--vector-scale"
+    code, out, _ = make.inside(capsys, *line, "16,8")
+    assert code == 0
+    assert "plain scale 16,8" in out
+    for wrong in ("16,8,4", "16,", "a"):
+        code, _, err = make.inside(capsys, *line, wrong)
+        assert code == 2
+        assert "--vector-scale" in err
+
+
+def test_vectors_below_a_pixel_of_no_unit_are_told(tmp_path):
+    rng = np.random.default_rng(0)
+    noise = {n: rng.uniform(-0.2, 0.2, (make.HEIGHT, make.WIDTH, 2)) for n in NUMBERS}
+    clip = Clip(of_layers(tmp_path, lambda n: {"motion.x,motion.y": noise[n]}))
+    assert clip.is_finding_notable
+    assert "below a pixel" in clip.finding
+
+
+def test_slow_vectors_stay_pixels(tmp_path):
+    velocity = (0.6, 0.3)
+    for n in NUMBERS:
+        channels = make.colors(make.picture(n, velocity)) | make.written(
+            "nuke", *make.motion(n, velocity)
+        )
+        make.write_exr(tmp_path / f"s.{n:04d}.exr", channels)
+    got = motion_of(Clip(tmp_path / "s.####.exr"))[..., 2:]
+    np.testing.assert_array_equal(got, make.motion(5, velocity)[1])
+
+
+# ---- names ----------------------------------------------------------------------------------
+
+ONE_WAY = (
+    "Motion Vector.R,Motion Vector.G", "MV.R,MV.G", "VectX,VectY", "Vectors.X,Vectors.Y",
+    "motionvec.r,motionvec.g", "motion_vectors.r,motion_vectors.g", "motionFore.x,motionFore.y",
+    "VectorX,VectorY", "RS_MotionVectors.R,RS_MotionVectors.G", "motionVectorX,motionVectorY",
+    "rgba_motionvector.red,rgba_motionvector.green", "flow.u,flow.v",
+    "ViewLayer.Motion Vectors.R,ViewLayer.Motion Vectors.G",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("up", [-1, pytest.param(1, marks=pytest.mark.full)])
+@pytest.mark.parametrize(
+    "names", [*ONE_WAY[:4], *(pytest.param(n, marks=pytest.mark.full) for n in ONE_WAY[4:])]
+)
+def test_names_that_programs_give_to_vectors_are_known(tmp_path, names, up):
+    turned = np.array([1, up], "f4")
+    is_right(Clip(of_layers(tmp_path, lambda n: {names: to_next(n) * turned})), 0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    "names",
+    [("motionFore.x,motionFore.y", "motionBack.x,motionBack.y"),
+     ("VectorX,VectorY", "BackVectorX,BackVectorY"),
+     ("forward.u,forward.v", "backward.u,backward.v")],
+)  # fmt: skip
+def test_vectors_to_the_previous_frame_may_lead_from_it(tmp_path, names, sign):
+    ahead, back = names
+    clip = Clip(of_layers(tmp_path, lambda n: {
+        ahead: to_next(n) * UP, back: sign * make.motion(n)[0] * UP}))  # fmt: skip
+    np.testing.assert_array_equal(motion_of(clip), np.dstack(make.motion(5)))
+
+
+@pytest.mark.parametrize("name", ["Normal Vector", "position", "world_velocity", "P"])
+def test_other_vectors_are_not_motion(tmp_path, name):
+    names = f"{name}.x,{name}.y"
+    clip = Clip(of_layers(tmp_path, lambda n: {names: to_next(n)}))
+    assert clip.frame(clip.source(5)).motion is None
+    assert "vector_layer" not in clip.finding
+
+
+def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys):
+    pattern = of_layers(tmp_path, lambda n: {"warp.x,warp.y": to_next(n) * -UP})
+    code, out, _ = make.inside(capsys, "info", pattern)
+    assert code == 0
+    assert "warp has negative numbers; --vector-layer warp takes warp" in out
+    is_right(Clip(pattern, passes=Passes(vectors=Vectors(layer="warp"))), 0)
+
+
+# ---- no vectors -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("convention", ["blender", "nuke", "arnold", "plain"])
+@pytest.mark.parametrize("number", [1e4, -1e4, 1e10, 65504.0])
+def test_where_there_is_no_vector_nothing_moves(convention, number):
+    channels = make.written(convention, *make.motion(5))
+    for plane in channels.values():
+        plane[:6] = number
+    got = vectors.read(channels, Vectors(convention))
+    assert (got[:6] == 0).all()
+    np.testing.assert_array_equal(got[6:, :, 2:], to_next(5)[6:])
