@@ -71,7 +71,7 @@ install_into() {
     home=$1
     shift
     touch "$home/unfinished"
-    .venv/bin/python -I -m pip --python "$home/bin/python" install --quiet \
+    .venv/bin/python -I -m pip --python "$home/bin/python" install --quiet --no-deps \
         --disable-pip-version-check "$@" || {
         code=$?
         [ $code -gt 2 ] || rm -f "$home/unfinished"  # pip gave up by itself and left nothing
@@ -81,10 +81,30 @@ install_into() {
     rm -f "$home/unfinished"
 }
 
+# Packages of a lock with all that they need, into an environment: only wheels whose hashes are in
+# the lock, and nothing is built. $1: environment; then the words of tools/locked.py.
+install_locked() {
+    place=$1
+    shift
+    .venv/bin/python -I tools/locked.py "$@" >"$place/locked.txt" || exit 1
+    install_into "$place" --require-hashes --only-binary :all: --requirement "$place/locked.txt"
+}
+
+# wgmb itself, editable, into an environment; .venv has what builds it.
+install_wgmb() {
+    rm -rf "$1/wheel"
+    said=$(.venv/bin/python -I -m hatchling build -t wheel:editable -d "$1/wheel" 2>&1) ||
+        { say "hatchling could not build wgmb: $said"; exit 1; }
+    install_into "$1" --no-index --force-reinstall "$1"/wheel/*.whl
+}
+
+# What an environment is made of; if it changes, the environment is brought up to date.
+state_of() { echo "$here" | cat - pyproject.toml "$@" | cksum; }
+
 # The environment .venv with the extras, such as "view,flow".
 set_up_venv() {
     ready=".venv/ready $1"
-    state=$(echo "$here" | cat - pyproject.toml constraints.txt | cksum)
+    state=$(state_of constraints.txt)
     if [ -e "$ready" ] && [ "$(cat "$ready")" = "$state" ] && .venv/bin/python -I -c ''; then
         return
     fi
@@ -94,21 +114,21 @@ set_up_venv() {
         "$python" -I -m venv --clear .venv
         echo "$here" >.venv/place
     fi
-    install_into .venv --constraint constraints.txt --editable ".[$1]"
+    install_locked .venv core bundle $(echo "$1" | tr , ' ')
+    install_wgmb .venv
     echo "$state" >"$ready"
 }
 
 # wgmb without extras, in build/core, for tests/project/test_core_alone.py.
 set_up_core() {
-    core=build/core
-    state=$(echo "$here" | cat - pyproject.toml constraints.txt | cksum)
+    core=build/core needs=tests/blender/needs.txt
+    state=$(state_of constraints.txt $needs)
     [ ! -e $core/ready ] || [ "$(cat $core/ready)" != "$state" ] || return 0
     say "setting up $core"
     .venv/bin/python -I -m venv --clear --without-pip $core
-    grep -v '^numpy' constraints.txt >$core/constraints.txt
-    # Blender's numpy; newer Pythons have no wheel of it.
-    install_into $core --constraint $core/constraints.txt --editable . \
-        'numpy == 1.26.* ; python_version < "3.13"' 'numpy == 2.1.* ; python_version >= "3.13"'
+    install_locked $core core
+    install_locked $core --lock $needs numpy  # Blender's; newer Pythons have no wheel of it
+    install_wgmb $core
     echo "$state" >$core/ready
 }
 
@@ -132,11 +152,10 @@ set_up_chromium() {
 }
 
 # Blender's module for tests/blender, 1 GB, in an environment of its own.
-blender_needs='bpy==4.5.15 pytest==9.2.0 hatchling==1.33.0'
 set_up_blender() {
     home=build/blender
     mkdir -p $home
-    state=$({ echo "$here $blender_needs"; cat blender/wheels.txt; } | cksum)
+    state=$(state_of blender/wheels.txt tests/blender/needs.txt)
     [ ! -e $home/ready ] || [ "$(cat $home/ready)" != "$state" ] || return 0
     rm -f $home/ready
     why=
@@ -149,8 +168,9 @@ set_up_blender() {
         limit=
         command -v timeout >/dev/null && limit="timeout 1200"
         { python3.11 -I -m venv --clear --without-pip $home/venv &&
-            $limit .venv/bin/python -I -m pip --python $home/venv install --quiet \
-                --disable-pip-version-check $blender_needs &&
+            $limit .venv/bin/python -I -m pip --python $home/venv install --quiet --no-deps \
+                --disable-pip-version-check --require-hashes --only-binary :all: \
+                --requirement tests/blender/needs.txt &&
             $limit .venv/bin/python blender/build.py fetch &&
             { $home/venv/bin/python -I -c 'import bpy' || {
                 (apt_install libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1)

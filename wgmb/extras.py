@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import platform
 import shlex
 import shutil
 import sys
@@ -91,7 +92,8 @@ def reason(error: ImportError, extra: str = "") -> str:
     of, name, _ = EXTRAS[package]
     if isinstance(error, ModuleNotFoundError):
         if not is_available(package):
-            return f"{name} is not available for Python {sys.version_info[0]}.{sys.version_info[1]}"
+            here = f"Python {sys.version_info[0]}.{sys.version_info[1]} on {platform.machine()}"
+            return f"{name} is not available for {here}"
         return f"{name} is not installed: {install_command(extra or of)}"
     if error.msg.startswith("cannot import name"):
         return f"{name} is too old for this: {install_command(extra or of)}"

@@ -98,7 +98,7 @@ def test_a_command_without_its_packages_is_one_line(command):
 def test_a_package_that_this_python_cannot_have_is_told_as_such(installed, monkeypatch):
     installed(["flip-evaluator>=1; (python_version < '3.11') and extra == 'compare'"])
     here = "{}.{}".format(*sys.version_info)
-    told = f"^FLIP: flip-evaluator is not available for Python {re.escape(here)}$"
+    told = f"^FLIP: flip-evaluator is not available for Python {re.escape(here)} on "
     monkeypatch.setitem(sys.modules, "flip_evaluator", None)
     with pytest.raises(InputError, match=told), needed_by("FLIP"):
         import flip_evaluator  # noqa: F401

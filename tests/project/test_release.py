@@ -4,10 +4,14 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
+import locked
 import metadata_hook
 import release
 from wgmb import __version__
@@ -82,6 +86,101 @@ def test_the_supported_pythons_are_those_of_the_workflow():
     tried = re.search(r"python: \[(.*)\]", text)[1].replace('"', "").split(", ")
     said = [c.rpartition(" ")[2] for c in PROJECT["project"]["classifiers"] if ":: 3." in c]
     assert tried == said
+
+
+WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_actions_are_pinned_by_commit(path):
+    """A tag can be moved; the tag that is meant stands in a comment."""
+    text = path.read_text("utf-8")
+    used = re.findall(r"uses: *(.*)", text)
+    assert used
+    for line in used:
+        assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}  # v\d+\.\d+\.\d+", line), line
+    assert len(set(used)) == len({line.partition("@")[0] for line in used})
+
+
+def test_the_container_is_made_of_what_hashes_name():
+    text = (ROOT / "Dockerfile").read_text("utf-8")
+    bases = re.findall(r"^FROM (\S+)", text, re.M)
+    assert len(bases) == 2 and len(set(bases)) == 1
+    assert re.fullmatch(r"python:3\.13-slim-trixie@sha256:[0-9a-f]{64}", bases[0])
+    joined = text.replace("\\\n", " ")
+    for words in re.findall(r"pip install ([^&\n]*)", joined):
+        assert "--require-hashes" in words or "--no-index" in words, words
+
+
+def test_pip_installs_by_hash_wherever_a_release_is_made():
+    """But in the job that tries the wheel as users install it, from which nothing is published."""
+    script = (ROOT / "tools/set_up.sh").read_text("utf-8").replace("\\\n", " ")
+    said = [line for line in script.splitlines() if re.search(r"\binstall --", line)]
+    said += [line for line in script.splitlines() if re.match(r" +install_into ", line)]
+    assert len(said) >= 4
+    for line in said:
+        assert re.search('--require-hashes|--no-index|pip --python .*"\\$@"', line), line
+    for path in WORKFLOWS:
+        for line in re.findall(r"^.*\b(?:pip|pipx) (?:install|run)\b.*$", path.read_text(), re.M):
+            assert "ls dist/*.whl" in line, line
+
+
+LOCKS = [locked.LOCK, ROOT / "tests/blender/needs.txt"]
+
+
+@pytest.mark.parametrize("path", LOCKS, ids=lambda path: path.name)
+def test_a_lock_has_the_hashes_of_all_its_packages(path):
+    entries = locked.entries(path)
+    assert len(entries) > 10
+    for entry in entries:
+        head, *rest = entry.text.replace("\\\n", " ").split("--hash=")
+        assert re.match(r"\S+==\S+ ", head), entry.name
+        assert rest and all(re.match(r"sha256:[0-9a-f]{64}\b", one) for one in rest), entry.name
+
+
+EXTRAS = {"core", *PROJECT["project"]["optional-dependencies"]}
+
+
+@pytest.mark.parametrize("extra", sorted(EXTRAS))
+def test_the_lock_fits_every_extra(extra):
+    """And has what its packages need, as far as they are installed here."""
+    listed = PROJECT["project"]["optional-dependencies"] | {
+        "core": PROJECT["project"]["dependencies"]
+    }
+    found = locked.needed([extra], locked.entries())
+    versions = {e.name: re.findall(r"==(\S+)", e.text)[0] for e in found}
+    needs = [Requirement(line) for line in listed[extra] if not line.startswith("wgmb[")]
+    for need in needs:
+        assert need.specifier.contains(versions[canonicalize_name(need.name)]), need
+    for name in versions:
+        try:
+            requires = metadata.distribution(name).requires or []
+        except metadata.PackageNotFoundError:
+            continue
+        for need in map(Requirement, requires):
+            if need.marker is None or need.marker.evaluate({"extra": ""}):
+                assert canonicalize_name(need.name) in versions, (name, str(need))
+
+
+@pytest.mark.skipif(
+    Path(sys.prefix) != ROOT / ".venv" or not (ROOT / ".venv/place").exists(),
+    reason="this environment was not made by ./run",
+)
+def test_every_package_of_the_environment_is_in_the_lock():
+    pinned = {(e.name, v) for e in locked.entries() for v in re.findall(r"^\S+==(\S+)", e.text)}
+    there = {(canonicalize_name(d.name), d.version) for d in metadata.distributions()}
+    assert {one for one in there if one[0] not in ("wgmb", "pip", "setuptools")} <= pinned
+
+
+def test_the_lock_says_which_packages_are_needed_and_names_what_it_does_not_know():
+    small = {e.name for e in locked.needed(["core", "cli"], locked.entries())}
+    assert {"wgpu", "cffi", "cyclopts", "rich", "markdown-it-py"} <= small
+    assert not small & {"pytest", "av", "pillow"}
+    assert {"pillow", "av", "glfw", "cyclopts"} <= {
+        e.name for e in locked.needed(["view"], locked.entries())
+    }
+    with pytest.raises(SystemExit, match="neither an extra nor a package of the lock: nonsense"):
+        locked.needed(["cli", "nonsense"], locked.entries())
 
 
 OLD = "import sys; sys.version_info = (3, 10, 13); sys.version = '3.10.13 (of a test)'; "
