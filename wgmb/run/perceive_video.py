@@ -27,7 +27,7 @@ from ..video.read.reader import VideoReader
 from .engine import Blurred, Input, IsDone
 from .report import Progress, VideoReport
 from .video import check_fits
-from .video_output import write
+from .video_output import sounds_kept, write
 from .video_sink import Form
 
 
@@ -129,7 +129,8 @@ def perceive_video(
     if output.fps is not None:
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
     reader = VideoReader(path, max_mb=input.max_mb)
-    clock = VideoSettings().clock(reader, input.frames)
+    video = VideoSettings()
+    clock = video.clock(reader, input.frames, sounds_kept(reader, output, video))
     wanted = OutputFrames(reader, clock, None)
     opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
     cone = perception.cone

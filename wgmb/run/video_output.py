@@ -21,7 +21,7 @@ from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.format import VideoFormat
-from ..video.write.other_streams import OtherStreams
+from ..video.write.other_streams import OtherStreams, sounds_in
 from ..video.write.segments import Segments, remove_left
 from ..video.write.writer import VideoWriter
 from .engine import Input, run
@@ -53,6 +53,14 @@ class VideoSource(Protocol):
     def frames(self, wanted: Sequence[OutputFrame], form: Form) -> Input[Any, Any]:
         """Output frames in a form, as the input of a run."""
         ...
+
+
+def sounds_kept(reader: VideoReader, output: OutputSettings, video: VideoSettings) -> list[int]:
+    """The streams of sound that are written beside the pictures of a video, by their numbers."""
+    suffix = Path(output.output).suffix.lower()
+    if suffix not in SUFFIXES or video.streams != "all":
+        return []
+    return sounds_in(reader.path, suffix, is_encoded=video.pace != 1)
 
 
 def write(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Literal, Self
@@ -165,10 +166,11 @@ class VideoSettings(FlowSettings):
             raise InputError(f"`end` must be after `begin`, got {self.begin} to {self.end}")
         return begin, end
 
-    def clock(self, reader: VideoReader, frames: str | None) -> Clock:
+    def clock(self, reader: VideoReader, frames: str | None, others: Collection[int] = ()) -> Clock:
         """The clock of the part that is asked for; InputError if there is no such part.
 
-        `frames`: numbers of the video's pictures, such as 120-480.
+        `frames`: numbers of the video's pictures, such as 120-480. `others`: numbers of the streams
+        that are written beside them: the first of all is at 0, however late the input's clock is.
         """
         start, (first, end) = reader.times[0], self.range
         first, end = (None if t is None else start + t for t in (first, end))
@@ -183,8 +185,8 @@ class VideoSettings(FlowSettings):
                 raise InputError(f"frames of a video must be one range, got {frames}")
             first = reader.times[numbers[0]]
             end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
-        origin = start if first is None else Fraction(0)
-        return Clock(first or start, self.pace, origin, first, end)
+        begin = reader.begin(others) if first is None else first
+        return Clock(begin, self.pace, Fraction(0), first, end)
 
 
 def time_of(name: str, text: str | None) -> Fraction | None:

@@ -31,11 +31,6 @@ class Clock:
         """The input time of an output time [s]."""
         return (time - self.origin) * self.speed + self.start
 
-    @property
-    def is_plain(self) -> bool:
-        """Return True if it leaves nothing out and keeps the speed."""
-        return self.speed == 1 and self.first is None and self.end is None
-
 
 AS_IT_IS = Clock()
 

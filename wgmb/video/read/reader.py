@@ -6,7 +6,7 @@ as they are stored (color/coding.py), upright and without interlacing. Colours a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice
@@ -41,6 +41,7 @@ from .rotation import rotation_of
 from .side_data import SideData, light_level_of, mastering_of, side_data_of
 from .timeline import Times, scanned
 
+PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
 
 
@@ -242,6 +243,14 @@ class VideoReader:
     def until(self) -> Fraction:
         """The end of the last picture [s]."""
         return self._timeline.until
+
+    def begin(self, others: Collection[int] = ()) -> Fraction:
+        """The time of the first picture [s], or of those `others` of its streams that begin before.
+
+        What a decoder of sound begins with, shortly before 0, is no sound.
+        """
+        begins = [self._packets.begins.get(number, self.times[0]) for number in others]
+        return min([self.times[0], *(max(t, Fraction(0)) if t >= PRIMING else t for t in begins)])
 
     @property
     def size(self) -> tuple[int, int]:

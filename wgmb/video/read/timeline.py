@@ -92,6 +92,8 @@ class Timeline:
     then those of decoding, and pictures are counted. None if that is impossible."""
     repeated: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     """Ticks of pictures that have the time of another one, and so are never shown."""
+    begins: dict[int, Fraction] = field(default_factory=dict)
+    """The time at which each stream begins, by its number [s]."""
     goes_back: tuple[int, Fraction, Fraction] | None = None
     """The first packet whose clock begins anew: its number, the time before it, its own [s]."""
 
@@ -190,6 +192,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     found = PictureTimes(stream.codec_context.name)
     wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
     ends: dict[int, int] = {}
+    begins: dict[int, int] = {}
     problem = ""
     try:
         for packet in container.demux(wanted):
@@ -198,11 +201,15 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
             if packet.pts is not None:
                 last = packet.pts + (packet.duration or 0)
                 ends[packet.stream_index] = max(last, ends.get(packet.stream_index, last))
+                if not packet.is_discard:
+                    first = begins.get(packet.stream_index, packet.pts)
+                    begins[packet.stream_index] = min(packet.pts, first)
             if packet.stream_index == stream.index:
                 found.add(packet)
     except FFmpegError as error:
         problem = str(error.strerror or error)
-    end = max((n * (container.streams[i].time_base or base) for i, n in ends.items()), default=base)
+    bases = [one.time_base or base for one in container.streams]
+    end = max((n * bases[i] for i, n in ends.items()), default=base)
     times, in_order, is_assumed = _picture_times(container, stream, found)
     timeline = Timeline(times, _sorted(found.keys), in_order, is_assumed, end, problem)
     is_raw = _is_raw(container)
@@ -212,6 +219,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
         is_encrypted=found.is_encrypted,
         stated=None if is_raw else known_rate(stream.average_rate),
         lasts=_lasting(stream, found, timeline),
+        begins={i: n * bases[i] for i, n in begins.items()},
         goes_back=None if is_assumed else _going_back(found.decoded, base),
     )
     if in_order:

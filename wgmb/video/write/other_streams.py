@@ -24,13 +24,14 @@ from av.stream import Discard, Disposition, Stream
 
 from ..clock import AS_IT_IS, Clock
 from ..read.container import opened
+from ..read.reader import PRIMING
 from .audio import SoundAtSpeed, encoder
+from .encoders import CONTAINERS
 
 if TYPE_CHECKING:
     from av.container.core import Chapter
 
 _BEFORE = 20  # seconds before the part to copy, at which reading begins
-_PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
 _AFTER = 5  # seconds after it, at which reading ends
 _OF_THE_FILE = (  # texts that say what another file holds
     "DURATION", "BPS", "NUMBER_OF_", "_STATISTICS", "HANDLER_NAME", "VENDOR_ID", "ENCODER",
@@ -211,25 +212,28 @@ class _Copied:
 
     def _fits(self, packet: Packet[Any]) -> bool:
         """Shorten a subtitle to the clock's part; return False for what is outside."""
-        first, end = self._clock.first, self._clock.end
         assert packet.pts is not None
-        begins = packet.pts * packet.time_base
-        if end is not None and begins >= end:
+        base, clock = packet.time_base, self._clock
+        begins, until = packet.pts * base, (packet.pts + (packet.duration or 0)) * base
+        if clock.end is not None and begins >= clock.end:
             return False
-        if first is None or begins >= first:
-            return True
-        lasts = (packet.duration or 0) * packet.time_base
-        if self._source.type != "subtitle" or begins + lasts <= first:
+        if self._source.type != "subtitle":
+            return clock.first is None or begins >= clock.first
+        first = clock.start if clock.first is None else clock.first
+        if begins < first and until <= first:
             return False
-        packet.pts = packet.dts = round(first / packet.time_base)
-        packet.duration = round((begins + lasts - first) / packet.time_base)
+        until = until if clock.end is None else min(until, clock.end)
+        if begins < first:
+            begins, packet.pts, packet.dts = first, round(first / base), round(first / base)
+        if packet.duration:
+            packet.duration = round((until - begins) / base)
         return True
 
 
 def _is_cut(packet: Packet[Any]) -> bool:
     """Return True for what an edit list leaves out, but not for what decoders begin with."""
     assert packet.pts is not None
-    return packet.is_discard and not _PRIMING <= packet.pts * packet.time_base < 0
+    return packet.is_discard and not PRIMING <= packet.pts * packet.time_base < 0
 
 
 def _from_template(stream: Stream, to: OutputContainer) -> Stream:
@@ -244,6 +248,17 @@ def _describe(stream: Stream, like: Stream) -> None:
     if "name" in like.metadata:  # what MP4 calls a title
         stream.metadata.setdefault("title", like.metadata["name"])
     stream.disposition = like.disposition
+
+
+def sounds_in(path: Path, suffix: str, *, is_encoded: bool) -> list[int]:
+    """The numbers of the streams of sound in a file that a container of that suffix holds.
+
+    `is_encoded`: sound is encoded again, as at another speed.
+    """
+    kind = CONTAINERS[suffix]
+    with opened(path) as container:
+        streams = [s for s in container.streams.audio if s.codec_context is not None]
+        return [s.index for s in streams if not _refusal(s, kind, is_encoded)]
 
 
 def _refusal(stream: Stream, container: str, again: bool) -> str:
