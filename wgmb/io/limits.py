@@ -1,7 +1,16 @@
-"""Limit on the decoded size of an image file: a small file can declare gigabytes."""
+"""The law on files of strangers: none may ask for more than it can justify.
+
+Sizes, counts and offsets that a file states are compared with its length before a library acts on
+them; compressed data inflate to no more than their picture takes; and files that are read whole
+are regular ones of a bounded size. A file that cannot be judged is refused in one line.
+"""
 
 from __future__ import annotations
 
+import os
+import stat
+import zlib
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import InputError
@@ -39,3 +48,51 @@ def check(path: Path, name: str, promised: int, stored: int, max_mb: float) -> N
         f"{path}: image of {name} would decode to {-(-promised // 2**20)} MB{because}, "
         f"the limit is {most:g} MB; `max_mb={needed}` allows it"
     )
+
+
+def held(name: str, count: int, size: int, stored: int) -> None:
+    """Raise ValueError where `count` things of at least `size` bytes exceed `stored` bytes.
+
+    `name`: of the things, for the message.
+    """
+    if count * size > stored:
+        raise ValueError(f"damaged: states {count} {name}, more than {stored} bytes can hold")
+
+
+def inflated(pieces: Iterable[bytes | memoryview], size: int, name: str) -> bytes:
+    """The bytes of a zlib stream, which must be at most `size`; ValueError if it has more.
+
+    `name`: of the data, for the message.
+    """
+    stream, found, left = zlib.decompressobj(), [], size
+    try:
+        for piece in pieces:
+            found.append(stream.decompress(piece, left + 1))
+            left -= len(found[-1])
+            if left < 0:
+                raise ValueError(f"{name} inflates to more than {size} bytes")
+    except zlib.error as error:
+        raise ValueError(f"{name} is damaged: {error}") from None
+    if not stream.eof:
+        raise ValueError(f"{name} is cut off")
+    return b"".join(found)
+
+
+def whole(path: Path, most: int, kind: str) -> bytes:
+    """The bytes of a regular file of at most `most` bytes, such as a camera file.
+
+    A FIFO, a device and a link to one are refused without being read. `kind`: of the file, for
+    the message. InputError names the file; OSError where the system refuses it.
+    """
+    with open(path, "rb", opener=_without_waiting) as file:
+        is_regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+        data = file.read(most + 1) if is_regular else b""
+    if not is_regular:
+        raise InputError(f"{path}: must be a regular file, is a pipe, a device or a folder")
+    if len(data) > most:
+        raise InputError(f"{path}: over {most >> 20} MiB, too large for {kind}")
+    return data
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

@@ -20,12 +20,12 @@ from ..color.spaces import ColorSpace
 from ..color.srgb import ToDisplay, linear, to_display
 from ..errors import InputError
 from ..extras import needed_by
-from . import limits
+from . import limits, stated
 from .record import KEY
 from .suffixes import STILLS
 
 if TYPE_CHECKING:
-    from av.container import InputContainer
+    from av.video.codeccontext import VideoCodecContext
 
 SUFFIXES = STILLS
 _AFTER_HEADER = 33  # bytes of a PNG's signature and IHDR
@@ -81,10 +81,10 @@ def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarr
     if not path.is_file():
         raise InputError(f"{path}: no such file")
 
-    def allow(width: int, height: int) -> None:
+    def allow(width: int, height: int, segments: int) -> None:
         if width < 1 or height < 1:
             raise ValueError(f"{width} x {height} pixels")
-        unpacked = limits.unpacked((width, height), 4)
+        unpacked = max(limits.unpacked((width, height), 4), segments)
         limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
 
     try:
@@ -98,19 +98,11 @@ def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarr
         raise InputError(f"{path}: not a readable image: {lines[0]}") from None
 
 
-Allow = Callable[[int, int], None]
-"""Told the width and height before any pixel is read; raises where they are too large."""
-
-
-def _read_png(data: bytes, allow: Allow) -> np.ndarray:
-    if len(data) < _AFTER_HEADER or data[:8] != b"\x89PNG\r\n\x1a\n":
-        raise ValueError("no PNG header")
-    if b"IEND" not in data[-1024:]:
-        raise ValueError("cut off before its end")
-    allow(*struct.unpack(">II", data[16:24]))
-    opened = _av().open(io.BytesIO(data), format="png_pipe")
-    with cast("InputContainer", opened) as container:
-        frame = next(container.decode(video=0))
+def _read_png(data: bytes, allow: stated.Allow) -> np.ndarray:
+    av = _av()
+    codec = cast("VideoCodecContext", av.CodecContext.create("png", "r"))
+    codec.thread_count = 1
+    frame = [*codec.decode(av.Packet(stated.png(data, allow))), *codec.decode(None)][0]
     name = frame.format.name
     alpha = name.startswith(("rgba", "ya", "pal8"))
     deep = "16" in name or "48" in name or "64" in name
@@ -123,28 +115,28 @@ def _read_png(data: bytes, allow: Allow) -> np.ndarray:
     return frame.to_ndarray(format=wanted)
 
 
-def _read_jpeg(data: bytes, allow: Allow) -> np.ndarray:
+def _read_jpeg(data: bytes, allow: stated.Allow) -> np.ndarray:
     _, jpeg = _jpeg()
-    with jpeg(io.BytesIO(data)) as image:  # PIL's `open` has its own limit
-        allow(*image.size)
+    with jpeg(io.BytesIO(stated.jpeg(data))) as image:  # PIL's `open` has its own limit
+        allow(*image.size, 0)
         if image.mode not in ("L", "RGB"):
             raise ValueError(f"must be grey or RGB, is {image.mode}")
         return np.asarray(image)
 
 
-def _read_tiff(data: bytes, allow: Allow) -> np.ndarray:
+def _read_tiff(data: bytes, allow: stated.Allow) -> np.ndarray:
     tifffile = _tifffile()
-    with tifffile.TiffFile(io.BytesIO(data)) as file:
+    with tifffile.TiffFile(io.BytesIO(stated.tiff(data))) as file:
         page = file.pages.first
-        if len(file.pages) != 1:
-            raise ValueError(f"must be a single image, has {len(file.pages)} pages")
-        allow(page.imagewidth, page.imagelength)
+        segments = stated.tiff_segment(page) * len(page.databytecounts)
+        allow(page.imagewidth, page.imagelength, segments)
         if page.photometric not in (tifffile.PHOTOMETRIC.RGB, tifffile.PHOTOMETRIC.MINISBLACK):
             raise ValueError(
                 f"must be grey or RGB, is {tifffile.PHOTOMETRIC(page.photometric).name}"
             )
         if sum(page.databytecounts) > len(data) or page.samplesperpixel > 4:
             raise ValueError("damaged: the header declares more data than the file holds")
+        stated.bound_segments(page, tifffile.TIFF.DECOMPRESSORS)
         return page.asarray()
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import hashlib
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import tifffile
+from PIL import Image
+
 import make_frames as make
+from wgmb.color.srgb import to_display
 from wgmb.io import stills
 
 from . import StatedKind, too_large
@@ -29,6 +33,16 @@ def _of_stills(path: Path, output: Path) -> list[list]:
 
 def _still(path: Path, number: int = 2) -> None:
     path.write_bytes(stills.encode(make.picture(number)[..., :3], path.suffix, 8, "{}"))
+
+
+def _progressive(path: Path) -> None:
+    Image.fromarray(to_display(make.picture(2)[..., :3], 8)).save(path, progressive=True)
+
+
+def _tiff(**options) -> Callable[[Path], object]:
+    return lambda path: tifffile.imwrite(
+        path, to_display(make.picture(2)[..., :3], 8), photometric="rgb", **options
+    )
 
 
 def _pixels(path: Path) -> str:
@@ -56,6 +70,71 @@ def _with_crc(data: bytes) -> bytes:
     return data[:29] + struct.pack(">I", zlib.crc32(data[12:29])) + data[33:]
 
 
+def jpeg(data: bytes) -> Iterator[tuple[str, bytes]]:
+    """The length of each segment, and each number of the frame's and the scans' headers."""
+    at = 2
+    while at < len(data) and data[at + 1] != 0xD9:
+        marker, (length,) = data[at + 1], struct.unpack_from(">H", data, at + 2)
+        places = [("length", at + 2, ">H")]
+        if marker in (0xC0, 0xC2):
+            places += [("bits", at + 4, ">B"), ("height", at + 5, ">H"), ("width", at + 7, ">H")]
+            places += [("of the frame", at + 9 + i, ">B") for i in range(length - 7)]
+        if marker == 0xDA:
+            places += [("of the scan", at + 4 + i, ">B") for i in range(length - 2)]
+        for name, place, form in places:
+            for value, changed in too_large(data, place, form, less=(0,)):
+                yield f"{marker:02X}: {name} at {place} {value}", changed
+        at += 2 + length
+        while marker == 0xDA and not (data[at] == 0xFF and data[at + 1] not in (0, *_RESTARTS)):
+            at += 1
+
+
+_RESTARTS = range(0xD0, 0xD8)
+_FORMS = {1: "B", 3: "H", 4: "I", 16: "Q"}
+
+
+def tiff(data: bytes) -> Iterator[tuple[str, bytes]]:
+    """Every number of the list of tags, and the first and last value of each tag."""
+    big = data[2:4] == b"+\0"
+    place, word, entry = (8, "<Q", 20) if big else (4, "<I", 12)
+    count_form = "<Q" if big else "<H"
+    (at,) = struct.unpack_from(word, data, place)
+    (count,) = struct.unpack_from(count_form, data, at)
+    begin = at + struct.calcsize(count_form)
+    places = [("offset of the tags", place, word), ("count of tags", at, count_form)]
+    places += [("next list", begin + count * entry, word)]
+    for each in range(begin, begin + count * entry, entry):
+        tag, kind = struct.unpack_from("<2H", data, each)
+        (values,) = struct.unpack_from(word, data, each + 4)
+        value = each + entry - place
+        places += [(f"tag {tag}", each, "<H"), (f"type of {tag}", each + 2, "<H")]
+        places += [(f"count of {tag}", each + 4, word), (f"value of {tag}", value, word)]
+        if form := _FORMS.get(kind):
+            size = struct.calcsize(form)
+            where = value
+            if values * size > place:
+                (where,) = struct.unpack_from(word, data, value)
+            for index in {0, values - 1}:
+                places.append((f"{tag}[{index}]", where + index * size, "<" + form))
+    for name, where, form in places:
+        for value, changed in too_large(data, where, form, less=(0, 1)):
+            yield f"{name} {value}", changed
+
+
 KINDS = {
     "png": StatedKind(".png", _still, png, _of_stills, _pixels),
+    "jpeg": StatedKind(".jpg", _still, jpeg, _of_stills, _pixels, many=True),
+    "jpeg-progressive": StatedKind(".jpg", _progressive, jpeg, _of_stills, _pixels, many=True),
+    "tiff": StatedKind(".tif", _still, tiff, _of_stills, _pixels, many=True),
+    "tiff-big": StatedKind(
+        ".tif", _tiff(bigtiff=True, rowsperstrip=8), tiff, _of_stills, _pixels, many=True
+    ),
+    "tiff-tiled": StatedKind(
+        ".tif",
+        _tiff(tile=(16, 16), compression="zlib", predictor=True),
+        tiff,
+        _of_stills,
+        _pixels,
+        many=True,
+    ),
 }
