@@ -7,12 +7,27 @@ import pytest
 
 import wgmb
 from images import camera
-from make_frames import HEIGHT, WIDTH, frame, inside, projection, write_exr, write_sequence
+from make_frames import (
+    HEIGHT,
+    WIDTH,
+    colors,
+    frame,
+    inside,
+    motion,
+    picture,
+    projection,
+    texture,
+    write_exr,
+    write_sequence,
+    written,
+)
 from wgmb import (
     Camera,
     Clip,
     InputError,
+    Passes,
     Reprojections,
+    Vectors,
 )
 from wgmb.cli import app
 from wgmb.color.srgb import linear
@@ -205,3 +220,54 @@ def test_a_shot_of_one_frame_stays_sharp(tmp_path, method):
 def test_senseless_cuts_are_refused(tmp_path, cuts):
     with pytest.raises(InputError, match=r"cuts .*whole numbers"):
         Clip(write_sequence(tmp_path, [1, 2]), cuts=cuts)
+
+
+# ---- no cut where vectors fail, or light changes everywhere ---------------------------------
+
+
+def lit(n, velocity=(4.0, 2.0)):
+    """A frame under light that is another one everywhere, and its passes."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype("f4")
+    light = np.clip(texture(x + 31 * n, y - 17 * n, 3.0 * n), 0.05, None)
+    albedo = picture(n, velocity)[..., :3]
+    made = {"DiffCol": albedo, "DiffDir": light, "Combined": albedo * light}
+    channels = {f"ViewLayer.{layer}.{c}": image[..., i].astype("f4")
+                for layer, image in made.items() for i, c in enumerate("RGB")}  # fmt: skip
+    return channels | written("blender", *motion(n, velocity))
+
+
+def test_light_that_moves_everywhere_is_no_cut_and_leaves_vectors_right(tmp_path):
+    for n in (1, 2, 3):
+        write_exr(tmp_path / f"s.{n:04d}.exr", lit(n))
+    clip = Clip(tmp_path / "s.####.exr")
+    assert "blender, tested" in clip.finding
+    assert neighbours(clip, 2) == (True, True)
+    assert not clip.cuts
+    channels = {k: v[::-1, ::-1].copy() for k, v in lit(1).items()}
+    write_exr(tmp_path / "s.0004.exr", channels)
+    clip = Clip(tmp_path / "s.####.exr")
+    assert neighbours(clip, 3) == (True, False)  # a real one is found under that light, too
+
+
+@pytest.mark.parametrize("told", ["auto", "nuke"])
+@pytest.mark.parametrize("damage", ["scaled", "random", "far"])
+def test_vectors_that_are_wrong_are_no_cut(tmp_path, damage, told):
+    """Neither those that fail their test nor those that nobody tests."""
+    rng = np.random.default_rng(0)
+    wrong = {"scaled": lambda v: v * 30, "random": lambda v: rng.uniform(-9, 9, v.shape),
+             "far": lambda v: v * 0 + 40}[damage]  # fmt: skip
+    for n in (1, 2, 3):
+        vectors = written("nuke", *(wrong(v).astype("f4") for v in motion(n)))
+        write_exr(tmp_path / f"s.{n:04d}.exr", frame(n, None) | vectors)
+    clip = Clip(tmp_path / "s.####.exr", passes=Passes(vectors=Vectors(told)))
+    assert neighbours(clip, 2) == (True, True)
+    assert not clip.cuts
+
+
+def test_what_crosses_emptiness_quickly_is_no_cut(tmp_path):
+    """Most is empty before and after, and much of the rest is uncovered."""
+    for n in (1, 2, 3):
+        rgba = picture(n, (10.0, 3.0)) * motion(n, (10.0, 3.0))[1].any(axis=2)[..., None]
+        write_exr(tmp_path / f"s.{n:04d}.exr", frame(n, "nuke", (10.0, 3.0)) | colors(rgba))
+    clip = Clip(tmp_path / "s.####.exr")
+    assert neighbours(clip, 2) == (True, True)

@@ -18,6 +18,7 @@ from .layers import names as layers
 from .layers.camera_file import CameraFile
 from .layers.masks import Masks
 from .layers.vector_convention import ConventionFinder
+from .layers.vector_test import ConventionFinding
 
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
@@ -43,6 +44,11 @@ class FrameBuilder:
         self._cameras = cameras
         self.picture_motion: Callable[[FrameFile], Found | None] | None = None
         self.brighten: Callable[[np.ndarray], np.ndarray] = lambda rgba: rgba
+
+    @property
+    def finding(self) -> ConventionFinding:
+        """Meaning of the vectors."""
+        return self._finder.finding
 
     def build(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
         """The Frame of `source` as its layers have it; of OPTIONAL, only what is `wanted`.

@@ -12,6 +12,7 @@ from ..errors import InputError, check_choice
 from ..extent import Extent
 from ..frame import Frame
 from ..shots.cuts import (
+    frames_differ,
     is_cut,
     jumps,
     still,
@@ -215,8 +216,9 @@ class Neighbours:
                     self.frame(self._stored.leader(number), frozenset())
                 return self._jumps[number]
         sides: list[int] = []
+        is_search = self._is_search and not self._builder.finding.is_failed
         for side in (-1, 1):
-            if self._stored.is_known_cut(number, side) or (self._is_search and jumps(frame, side)):
+            if self._stored.is_known_cut(number, side) or (is_search and jumps(frame, side)):
                 sides.append(side)
                 frame = straightened(frame, side)
         if source.view is not None:
@@ -230,7 +232,7 @@ class Neighbours:
         if not self._is_search:  # known ones are not asked
             return False
         if source.view is None:
-            return is_cut(frame, near, side)
+            return self._differ(frame, near, side)
         key = source.number, side
         if key not in self._cuts_to:
             leader = self._stored.leader(source.number)
@@ -239,8 +241,18 @@ class Neighbours:
                     other = self._stored.neighbour(leader, side)
                     if other is not None and other.display_window == leader.display_window:
                         frame, near = self._locked(leader, wanted), self._locked(other, wanted)
-            self._cuts_to[key] = is_cut(frame, near, side)
+            self._cuts_to[key] = self._differ(frame, near, side)
         return self._cuts_to[key]
+
+    def _differ(self, frame: Frame, near: Frame, side: int) -> bool:
+        """True if neither the motion nor a search finds `frame` again in its neighbour.
+
+        Vectors that failed their test, or were not tested, cannot tell a cut.
+        """
+        finding = self._builder.finding
+        if not is_cut(frame, near, side):
+            return False
+        return finding.vectors is None or finding.sure or frames_differ(frame, near)
 
     # ---- data windows ----------------------------------------------------------------------
 

@@ -14,11 +14,11 @@ from ..frame import Frame
 from .prediction import BLOCK, predicted
 
 _PROBES = 2000  # pixels looked at
-_CUT = (
-    0.5  # of the difference of unrelated places; measured: 0.0 to 0.3 without a cut, 0.6 to 1 with
-)
+_CUT = 0.5  # of the difference of unrelated places, in the middle; measured: 0.0 to 0.25 without
+# a cut, where half of a small picture is uncovered too, and 0.75 to 1.15 with one
+_STANDS = 0.85  # the same where nothing is moved: 0.72 where all but the background moves
+_SEEN = 0.005  # difference of tones below which two places are both empty, or one
 _INSIDE = 0.05  # share of probes that must still be in the neighbour's picture
-_MOST = 0.5  # difference of tones beyond which a pixel has merely changed
 _JUMP = 8  # times the motion to the other side
 _FAR = 0.1  # of the picture's width
 _SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
@@ -39,6 +39,40 @@ _LUMA = np.array([0.25, 0.625, 0.125], np.float32)
 def pictures_differ(before: np.ndarray, after: np.ndarray) -> bool:
     """Return True if a cut lies between two pictures (height, width, 3 or 4) without vectors."""
     return smalls_differ(_small(before), _small(after))
+
+
+def frames_differ(frame: Frame, near: Frame) -> bool:
+    """Return True if a cut lies between two frames, by their pictures alone.
+
+    Light may change everywhere at once; where both have the colour of surfaces, that tells too.
+    """
+    return is_cut(still(frame), near, 1, _STANDS) and all(
+        pictures_differ(_on_display(frame, a), _on_display(near, b))
+        for a, b in _pictures(frame, near)
+    )
+
+
+def _pictures(frame: Frame, near: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The pictures of two frames, and the colours of their surfaces if both have them."""
+    found: list[tuple[np.ndarray, np.ndarray]] = [(frame.color, near.color)]
+    if frame.diffuse_color is not None and near.diffuse_color is not None:
+        found.append((frame.diffuse_color, near.diffuse_color))
+    return found
+
+
+def _on_display(frame: Frame, image: np.ndarray) -> np.ndarray:
+    """An image of a frame in its display window; black where there is none of it."""
+    left, top, width, height = frame.window or (0, 0, *frame.size)
+    if (left, top, width, height) == (0, 0, *frame.size):
+        return image
+    whole = np.zeros((height, width, 3), image.dtype)
+    rows, columns = (
+        slice(max(top, 0), top + image.shape[0]),
+        slice(max(left, 0), left + image.shape[1]),
+    )
+    there = whole[rows, columns]
+    there[:] = image[max(-top, 0) :, max(-left, 0) :, :3][: there.shape[0], : there.shape[1]]
+    return whole
 
 
 def small_step(width: int, height: int) -> int:
@@ -140,7 +174,8 @@ def _small(color: np.ndarray) -> np.ndarray:
     height, width = (n // step for n in color.shape[:2])
     cut = color[: height * step, : width * step, :3]
     parts = cut.reshape(height, step, width * step, 3).mean(axis=1, dtype=np.float32)
-    return srgb(np.clip(parts.reshape(height, width, step, 3).mean(axis=2), 0, 1))
+    small = parts.reshape(height, width, step, 3).mean(axis=2)
+    return srgb(np.clip(np.nan_to_num(small), 0, 1))
 
 
 def jumps(frame: Frame, side: int) -> bool:
@@ -172,12 +207,13 @@ def still(frame: Frame) -> Frame:
     return replace(frame, motion=motion, camera=None, object_id=None, object_motion=False)
 
 
-def is_cut(frame: Frame, near: Frame, side: int) -> bool:
+def is_cut(frame: Frame, near: Frame, side: int, most: float = _CUT) -> bool:
     """Return True if a cut lies between `frame` and its neighbour `near` on `side` (-1 or 1).
 
     2,000 pixels, each the mean of 3 x 3, are compared with where their motion puts them in
-    `near`, and with places picked at random: across a cut the two differ alike. The images may
-    be different parts of one display window; outside them is nothing.
+    `near`, and with places picked at random: across a cut the two differ alike, and so do those of
+    the surfaces' colours, if both have them. The images may be different parts of one display
+    window; outside them is nothing.
     """
     rng = np.random.default_rng(0)
     x, y, width, height = _probes(frame, rng)
@@ -189,10 +225,25 @@ def is_cut(frame: Frame, near: Frame, side: int) -> bool:
     if inside.mean() < _INSIDE:
         return True
     there = np.rint(where[inside]).astype(int) + first - other
-    here = _tones(frame.color, x[inside], y[inside])
-    follows = _difference(here, _tones(near.color, *there.T))
-    unrelated = _difference(here, _tones(near.color, *rng.permutation(there).T))
-    return bool(follows > _CUT * unrelated)
+    random = rng.permutation(there)
+    return all(
+        _are_unrelated(
+            _tones(own, x[inside], y[inside]),
+            _tones(others, *there.T),
+            _tones(others, *random.T),
+            most,
+        )
+        for own, others in _pictures(frame, near)
+    )
+
+
+def _are_unrelated(here: np.ndarray, moved: np.ndarray, random: np.ndarray, most: float) -> bool:
+    """Return True if tones differ from the `moved` ones about as much as from those at random."""
+    follows, unrelated = (np.abs(here - tones).sum(axis=1) for tones in (moved, random))
+    told = (follows > _SEEN) | (unrelated > _SEEN)
+    if not told.any():
+        return False
+    return bool(np.median(follows[told]) > most * np.median(unrelated[told]))
 
 
 def _probes(frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, int, int]:
@@ -228,7 +279,3 @@ def _tones(color: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
             light = np.clip(np.nan_to_num(color[at][:, :3].astype(np.float64)), 0, 1e6)
             total += light / (1 + light)
     return np.where(_within(color, x, y)[:, None], total / 9, 0.0)
-
-
-def _difference(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.minimum(np.abs(a - b).sum(axis=1), _MOST).mean())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 
 import numpy as np
 
@@ -15,7 +16,14 @@ from ..data_windows import (
 )
 from ..frame_cache import FrameCache
 from ..frame_file import FrameFile
-from . import vector_test, vectors
+from . import light, vector_test, vectors
+
+Look = Callable[[FrameFile], np.ndarray | None]
+"""Image of a frame on which vectors are tested, (height, width, 3 or 4); None if it has none."""
+
+
+def _picture(source: FrameFile) -> np.ndarray:
+    return source.rgba
 
 
 class ConventionFinder:
@@ -51,9 +59,17 @@ class ConventionFinder:
         return None
 
     def _find_out(self) -> vector_test.ConventionFinding:
-        wanted, there = self._wanted, self._stored.files.on_disk
-        if wanted.convention == "none":
+        if self._wanted.convention == "none":
             return vector_test.ConventionFinding(None, False, "none requested")
+        found = self._test(_picture)
+        if found.is_failed:  # the light may have changed everywhere
+            of_surfaces = self._test(self._surfaces)
+            found = of_surfaces if of_surfaces.sure else found
+        return found
+
+    def _test(self, look: Look) -> vector_test.ConventionFinding:
+        """The finding by what `look` gives of a frame and of its neighbours."""
+        there = self._stored.files.on_disk
         found = self._none_found(there[0])
         evidence: list[vector_test.Evidence] = []
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
@@ -61,15 +77,22 @@ class ConventionFinder:
                 source, named = self._named(number)
                 if named is None:
                     continue
-                if wanted.convention != "auto":
-                    return vector_test.ConventionFinding(named, True, str(named))
-                evidence.append(self._evidence(source, named))
+                if self._wanted.convention != "auto":
+                    return vector_test.ConventionFinding(named, False, str(named))
+                evidence.append(self._evidence(source, named, look))
                 has_both = self._has_both(source, named)
                 found = vector_test.decide(named, evidence, has_both=has_both)
                 seen = {side for e in evidence for side in e.sides}
                 if found.sure and found.vectors == named and (len(seen) == 2 or not has_both):
                     break
         return found
+
+    def _surfaces(self, source: FrameFile) -> np.ndarray | None:
+        """(height, width, 3) colour of surfaces, whatever light falls on them, if it is there."""
+        own = self._stored.own(source)
+        for one in light.find(own, source.reference_channel).lights:
+            return np.stack([own[name] for name in one.color], axis=2)
+        return None
 
     def _none_found(self, number: int) -> vector_test.ConventionFinding:
         """The finding where no name speaks for vectors; a layer that may hold some is named."""
@@ -103,26 +126,30 @@ class ConventionFinder:
         sides = vectors.channels_of(self._stored.own(source), named, near)
         return len(sides) == 2 and form.prev == form.next
 
-    def _evidence(self, source: FrameFile, named: vectors.Vectors) -> vector_test.Evidence:
-        if source.reference_channel is None:
+    def _evidence(
+        self, source: FrameFile, named: vectors.Vectors, look: Look
+    ) -> vector_test.Evidence:
+        seen = look(source) if source.reference_channel is not None else None
+        if seen is None:
             return vector_test.Evidence(doubt="no picture to test it on")
         motion = vectors.read(self._stored.own(source), named, source.reference_channel)
-        near = [self._probe(source, side) for side in (-1, 1)]
+        near = [self._probe(source, side, look) for side in (-1, 1)]
         near = [one if one and near_enough(source.data_window, one[1]) else None for one in near]
         onto = union([source.data_window, *(window for _, window in filter(None, near))])
-        color, motion = (laid(a, source.data_window, onto) for a in (source.rgba, motion))
+        color, motion = (laid(a, source.data_window, onto) for a in (seen, motion))
         prev, next_ = (one and laid(*one, onto) for one in near)
         return vector_test.gathered(color, motion, prev, next_, source.whole)
 
-    def _probe(self, source: FrameFile, side: int) -> tuple[np.ndarray, Window] | None:
-        """The picture of a neighbour and its data window, to test vectors on."""
+    def _probe(self, source: FrameFile, side: int, look: Look) -> tuple[np.ndarray, Window] | None:
+        """The image of a neighbour, by `look`, and its data window, to test vectors on."""
         number = source.number + side
         if not self._stored.has_neighbour(source.number, side):
             return None
         try:
             other = self._stored.find(number, source.view)
             same = other.display_window == source.display_window
-            return (other.rgba, other.data_window) if same else None
+            seen = look(other) if same else None
+            return None if seen is None else (seen, other.data_window)
         except (InputError, OSError):
             return None
         finally:

@@ -48,9 +48,14 @@ class ConventionFinding:
     """Result of testing vectors on the neighbouring frames."""
 
     vectors: Vectors | None  # the reading that explains the neighbours; None: there are none
-    sure: bool  # something moves, and one reading is clearly better than standing still
+    sure: bool  # tested: something moves, and one reading is clearly better than standing still
     text: str  # for people
     notable: bool = False  # not what the names say, or doubtful: people should be told
+
+    @property
+    def is_failed(self) -> bool:
+        """The vectors were tested, and do not predict the neighbouring frames."""
+        return self.vectors is not None and self.notable and not self.sure
 
 
 @dataclass(frozen=True)
