@@ -7,8 +7,7 @@ that is an error that names the file.
 from __future__ import annotations
 
 import io
-import re
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import numpy as np
 import OpenEXR
 
 from ..errors import InputError, check_choice
-from . import chroma, deep, limits
+from . import chroma, deep, limits, lossy
 from .exr_library import hushed, inside
 from .limits import MOST_PIXELS_A_SIDE
 
@@ -34,7 +33,6 @@ COMPRESSIONS = {
     "dwab": OpenEXR.DWAB_COMPRESSION,
 }
 """The library's names of what every program reads; see also `check_compression`."""
-_LOSSY = tuple(COMPRESSIONS[name] for name in ("pxr24", "b44", "b44a", "dwaa", "dwab"))
 _SAME = "same"
 _DEEP = OpenEXR.deepscanline, OpenEXR.deeptile
 _FLATTENED = "deep pixels are flattened, the nearest sample first"
@@ -200,31 +198,35 @@ def check_compression(name: str) -> None:
     check_choice("compression", name, (*COMPRESSIONS, _SAME))
 
 
-def encode(exr: Exr, compression: str = "zip") -> bytes:
+def encode(
+    exr: Exr,
+    compression: str = "zip",
+    holds_numbers: Callable[[str], bool] = lambda layer: False,
+) -> bytes:
     """The file's bytes: every part in scan lines; the same parts give the same bytes.
 
-    InputError where a lossy compression would change the ids of a Cryptomatte.
+    A lossy compression is for pictures: layers of numbers that it would change (vectors, depth,
+    normals, ids of a Cryptomatte) get a part of their own in "zip". `holds_numbers`: True
+    of such a layer though its channels are called R, G and B.
     """
     check_compression(compression)
     parts = []
-    for part in exr.parts:
-        kind = part.compression if compression == _SAME else COMPRESSIONS[compression]
-        if kind in _LOSSY and (crypto := _cryptomatte(part)):
-            raise InputError(
-                f"{exr.path}: {kind.name.partition('_')[0].lower()} compression is lossy and would "
-                f"change the ids of the Cryptomatte {crypto}; zip keeps them"
-            )
-        # An empty list says nothing, and the library cannot write it.
-        kept = {k: v for k, v in part.attributes.items() if not (isinstance(v, list) and not v)}
-        header = {k: v for k, v in kept.items() if k not in _WRITTEN_ANEW} | {
-            "compression": kind,
-            "type": OpenEXR.scanlineimage,
-            "dataWindow": _box(part.data_window),
-            "displayWindow": _box(part.display_window),
-        }
-        # The library ignores strides and would write wrong pixels.
-        channels = {k: np.ascontiguousarray(v) for k, v in part.channels.items()}
-        parts.append((header, channels, part.name))
+    taken = [part.name for part in exr.parts]
+    for whole in exr.parts:
+        kind = whole.compression if compression == _SAME else COMPRESSIONS[compression]
+        for part, own in lossy.separated(whole, kind, holds_numbers, taken):
+            taken.append(part.name)
+            # An empty list says nothing, and the library cannot write it.
+            kept = {k: v for k, v in part.attributes.items() if not (isinstance(v, list) and not v)}
+            header = {k: v for k, v in kept.items() if k not in _WRITTEN_ANEW} | {
+                "compression": own,
+                "type": OpenEXR.scanlineimage,
+                "dataWindow": _box(part.data_window),
+                "displayWindow": _box(part.display_window),
+            }
+            # The library ignores strides and would write wrong pixels.
+            channels = {k: np.ascontiguousarray(v) for k, v in part.channels.items()}
+            parts.append((header, channels, part.name))
     stream = io.BytesIO()
     try:
         with inside():
@@ -232,16 +234,6 @@ def encode(exr: Exr, compression: str = "zip") -> bytes:
     except (RuntimeError, TypeError, ValueError) as error:
         raise InputError(f"{exr.path}: cannot be written as EXR: {_first_line(error)}") from None
     return stream.getvalue()
-
-
-def _cryptomatte(part: Part) -> str | None:
-    """The name of a Cryptomatte that has channels in `part`."""
-    for key, name in part.attributes.items():
-        if re.fullmatch(r"cryptomatte/[^/]+/name", key):
-            for channel in part.channels:
-                if channel.startswith(str(name)) or part.name.startswith(str(name)):
-                    return str(name)
-    return None
 
 
 def new(rgba: np.ndarray, attributes: dict[str, Any] | None = None) -> Exr:

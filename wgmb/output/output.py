@@ -31,6 +31,7 @@ from ..io.frame_numbers import (
 from ..io.suffixes import STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of
+from ..sequence.layers import vectors
 from . import finished_videos
 from .exr_layers import with_results
 from .names import prepare, refuse_inputs, that_exist
@@ -286,7 +287,7 @@ class Output:
         if path.suffix.lower() == ".exr":
             only_picture = self._layers == "picture"
             content = with_results(results, view, text, only_picture, self._grows)
-            return exr.encode(content, self._compression)
+            return exr.encode(content, self._compression, vectors.holds_numbers)
         shown = self._to_display(results[0])
         return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
 

@@ -16,6 +16,7 @@ from ...errors import InputError, check_choice
 from ...io.data_files import Unit
 from .conventions import CONVENTIONS, STEMS, Convention
 from .names import (
+    TRIPLES,
     MissingLayerError,
     component,
     ending,
@@ -35,9 +36,15 @@ _WIDE = 0.25  # from the middle: where the median of numbers lies that are store
 NOWHERE = 1e4
 """Numbers from here on, either way, stand for no vector: Blender writes 10000 where nothing was
 rendered, .flo files 1e9 where the flow is unknown."""
+_NUMBERS = STEMS | {stem for stems in TRIPLES.values() for stem in stems} | {"p", "position", "uv"}
 _VALID = ("mv_alpha", "mvalpha")  # layers or channels, after RE:Vision Effects' MV_Alpha
 _FULL = 0.999  # of the mask: vectors are valid
 _AROUND = ((0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+def holds_numbers(layer: str) -> bool:
+    """True if the name of a layer says that it holds vectors, directions or places, no colours."""
+    return ending(layer, _NUMBERS) is not None
 
 
 @dataclass(frozen=True)
