@@ -86,6 +86,15 @@ def test_frames_before_0_are_found_under_the_names_they_are_written_to(tmp_path,
     assert Clip(tmp_path / pattern, skip_missing=True).numbers == numbers
 
 
+@pytest.mark.parametrize("first", ["s.-0009.exr", "s.-009.exr"])
+def test_the_sign_of_a_frame_may_stand_before_all_its_digits(tmp_path, first):
+    touched(tmp_path, first, "s.0000.exr")
+    pattern = tmp_path / "s.####.exr"
+    assert Clip(pattern, skip_missing=True).numbers == [-9, 0]
+    assert frame_path(pattern, -9) == tmp_path / first
+    assert frame_path(pattern, -8) == tmp_path / "s.-008.exr"
+
+
 def test_the_name_of_a_frame_is_made_without_reading_the_pattern_again(tmp_path):
     """A run of 100,000 frames asks for each of its names several times."""
     pattern, calls = tmp_path / "shot.####.exr", []

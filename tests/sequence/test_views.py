@@ -86,6 +86,9 @@ def test_a_parts_name_leads_only_where_its_channels_need_it():
     assert layers == {"", "rgba", "diffuse"}
     normal = part_of("N", "X Y Z", view="right")
     assert {"N.X", "N.Y", "N.Z"} < set(found(rgb, normal)["right"])
+    both = [part_of(view, "R G B mask character.R", view=view) for view in ("left", "right")]
+    named = ["B", "G", "R", "character.R", "mask"]
+    assert found(*both) == {"left": named, "right": named}
 
 
 @pytest.mark.parametrize(

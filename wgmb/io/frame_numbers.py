@@ -32,8 +32,11 @@ class _Pattern:
     digits: int
     end: str
 
-    def name(self, number: int) -> str:
-        return f"{self.begin}{number:0{self.digits}d}{self.end}"
+    def names(self, number: int) -> tuple[str, ...]:
+        """Names of a frame's file. The sign of a negative number counts as a digit, as C's %04d
+        counts it, or does not, as Blender and Houdini write it."""
+        wide = (self.digits, self.digits + 1) if number < 0 else (self.digits,)
+        return tuple(f"{self.begin}{number:0{width}d}{self.end}" for width in wide)
 
 
 @lru_cache(maxsize=256)
@@ -54,9 +57,15 @@ def is_pattern(path: str | Path) -> bool:
 
 
 def frame_path(pattern: str | Path, number: int) -> Path:
-    """The file of frame `number`; a path that is no pattern stands for itself."""
+    """The file of frame `number`; a path that is no pattern stands for itself.
+
+    Of the two forms of a negative number, the one that exists, or else the first.
+    """
     parsed = _parsed(pattern)
-    return Path(pattern) if parsed is None else parsed.folder / parsed.name(number)
+    if parsed is None:
+        return Path(pattern)
+    first, *others = (parsed.folder / name for name in parsed.names(number))
+    return first if not others or first.exists() else next(filter(Path.exists, others), first)
 
 
 def titles(patterns: Sequence[str | Path]) -> list[str]:
@@ -144,7 +153,7 @@ def numbers_on_disk(pattern: str | Path) -> list[int]:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{parsed.folder}: {(why or str(error)).lower()}") from None
-    found = sorted(int(m[1]) for m in matches if parsed.name(int(m[1])) == m[0])
+    found = sorted({int(m[1]) for m in matches if m[0] in parsed.names(int(m[1]))})
     if not found:
         raise InputError(f"{pattern}: no such frames")
     return found

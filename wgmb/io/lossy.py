@@ -36,7 +36,8 @@ def separated(
 ) -> list[tuple[Part, OpenEXR.Compression]]:
     """A part as it is to be written in compression `kind`: data that this would change apart.
 
-    `holds_numbers`: True of a layer that does so though its channels are called R, G and B. `taken`: names of parts that the file has.
+    `holds_numbers`: True of a layer that does so though its channels are called R, G and B.
+    `taken`: names of parts that the file has.
     """
     ids = [
         str(value)

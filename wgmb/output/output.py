@@ -31,7 +31,7 @@ from ..io.frame_numbers import (
 from ..io.suffixes import STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of
-from ..sequence.layers import vectors
+from ..sequence.layers import alpha, vectors
 from . import finished_videos
 from .exr_layers import with_results
 from .names import prepare, refuse_inputs, that_exist
@@ -269,7 +269,8 @@ class Output:
         """Write the file of `view`, or of all."""
         first = results[0]
         if self._videos:
-            self._videos[view].add(first.displayed, self._to_display(first))
+            aspect = first.source.pixel_aspect
+            self._videos[view].add(first.displayed, self._to_display(first), aspect)
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
@@ -288,8 +289,9 @@ class Output:
             only_picture = self._layers == "picture"
             content = with_results(results, view, text, only_picture, self._grows)
             return exr.encode(content, self._compression, vectors.holds_numbers)
-        shown = self._to_display(results[0])
-        return stills.encode(results[0].displayed, path.suffix, self.bits, text, shown)
+        shown, picture = self._to_display(results[0]), results[0].displayed
+        picture = picture[..., :3] if alpha.is_void(picture) else picture
+        return stills.encode(picture, path.suffix, self.bits, text, shown)
 
     def _to_display(self, result: Result) -> ToDisplay:
         """Conversion of the picture to display values."""

@@ -99,6 +99,7 @@ class Clip:
             max_mb=self._max_mb,
         )
         self.sizes, self.notes, self.unread = cache.sizes, cache.notes, cache.unread
+        self.notes |= files.gaps(self.numbers)
         patterns = [str(pattern) for pattern in files.every_pattern]
         self.masks = Masks(
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views

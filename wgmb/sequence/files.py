@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Sequence
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 from ..errors import InputError, did_you_mean
@@ -135,6 +137,22 @@ class SequenceFiles:
                 raise InputError(f"{path}: no such file")
             return [number_in(path)]
         return list(self._settled.on_disk if self._settled else numbers_on_disk(self._leading))
+
+    def gaps(self, numbers: Sequence[int]) -> dict[str, list[int]]:
+        """Notes on those of `numbers` that lack a neighbour within the sequence."""
+        if not self.is_sequence:
+            return {}
+        first, last = self.on_disk[0], self.on_disk[-1]
+        apart = {b - a for a, b in pairwise(self.on_disk)}
+        if len(apart) == 1 and (step := apart.pop()) > 1:
+            text = (
+                f"frames are {step} apart: the shutter and the vectors count intervals of one "
+                f"frame, so that {180 * step} degrees are half of the time between these"
+            )
+            return {text: list(numbers)}
+        around = {n: [m for m in (n - 1, n + 1) if first <= m <= last] for n in numbers}
+        lacking = [n for n in numbers if not self._existing.issuperset(around[n])]
+        return {"a neighbouring frame is missing": lacking} if lacking else {}
 
     def chosen(self, frames: str | None, skip_missing: bool) -> list[int]:
         """The numbers that `frames` asks for (see Clip); InputError where some are missing."""

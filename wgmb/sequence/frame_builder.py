@@ -13,7 +13,7 @@ from ..frame import Frame
 from .flow_motion import Found
 from .frame_cache import FrameCache
 from .frame_file import FrameFile, about
-from .layers import light, vectors
+from .layers import alpha, light, vectors
 from .layers import names as layers
 from .layers.camera_file import CameraFile
 from .layers.masks import Masks
@@ -80,7 +80,7 @@ class FrameBuilder:
                 )
                 ids = self._object_ids(source) if reprojections.here.bodies else None
             return Frame(
-                self.brighten(source.rgba)
+                self.brighten(self._color(source))
                 if "color" in wanted
                 else np.zeros((*source.size[::-1], 3), np.float16),
                 motion=motion,
@@ -106,6 +106,18 @@ class FrameBuilder:
                 f"the vectors would be {', '.join(sorted(both))} of the picture itself; "
                 "`vector_layer` names another layer, `also` adds that of another file"
             )
+
+    def _color(self, source: FrameFile) -> np.ndarray:
+        """The picture, premultiplied; what its alpha seems to mean otherwise is noted."""
+        rgba, notes = source.rgba, self._stored.notes
+        if rgba.shape[2] == 3:
+            return rgba
+        if self._stored.passes.alpha == "straight":
+            return alpha.premultiplied(rgba)
+        remark = alpha.remark(rgba)
+        if remark and source.number not in (on := notes.setdefault(remark, [])):
+            on.append(source.number)
+        return rgba
 
     def check_layers(self) -> None:
         """InputError where a layer that is asked for by its name is in none of the frames.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,14 @@ class FrameFile:
                 part, own = self.origin.get(name, (self.part, name))
                 if part.channels.get(own) is stored:
                     part.channels[own] = plane
+
+    @property
+    def pixel_aspect(self) -> Fraction:
+        """Width of a pixel to its height, as an EXR says; 1 where that makes no sense."""
+        stated = self.part.attributes.get("pixelAspectRatio") if self.part else None
+        if not isinstance(stated, float) or not 1e-3 < stated < 1e3:
+            return Fraction(1)
+        return Fraction(stated).limit_denominator(1000)
 
     @property
     def window(self) -> Window | None:
@@ -382,7 +391,34 @@ def _remarks(frame: FrameFile) -> list[str]:
         return [_NO_PICTURE.format(frame.view)]
     lacks = ", ".join(c for c, name in zip("RGB", frame.color, strict=False) if not name)
     of = f" of view {frame.view}" if frame.view else ""
-    return [f"the picture{of} has no {lacks}, counted as 0"] if lacks else []
+    said = [f"the picture{of} has no {lacks}, counted as 0"] if lacks else []
+    if frame.pixel_aspect != 1:
+        wide = f"pixels are {float(frame.pixel_aspect):g} times as wide as high"
+        said.append(f"{wide}: EXR files and videos keep that, other images and GIFs do not")
+    return said + _other_layers(frame)
+
+
+def _other_layers(frame: FrameFile) -> list[str]:
+    """A remark on view layers that are not the picture, and have colour and vectors too."""
+    own = [name for name in frame.channels if name not in frame.shared]
+    taken = names.layer_of(frame.color)
+    others = [
+        layer
+        for layer in names.pictures(own)
+        if layer != taken and names.view_layer(layer) != names.view_layer(taken)
+        and any(
+            names.stem(near) in vectors.STEMS
+            for near in names.layers(own)
+            if near != layer and names.view_layer(near) == names.view_layer(layer)
+        )
+    ]  # fmt: skip
+    if not others:
+        return []
+    name, have = taken or "without a name", "have" if others[1:] else "has"
+    return [
+        f"the layer {name} is blurred; {', '.join(others)} {have} vectors too, and stays as it is: "
+        f"`color={others[0]}` blurs it in a run of its own"
+    ]
 
 
 def _picture_part(file: exr.Exr, places: stereo.Places, wanted: str | None) -> exr.Part:

@@ -51,6 +51,8 @@ class InputSettings:
     "Pattern of files with additional layers of the same frames; may be repeated."
     outside: Literal["auto", "nothing", "edge"] = "auto"
     "Surroundings of a cropped frame: nothing, or its edge repeated."
+    alpha: Literal["premultiplied", "straight"] = "premultiplied"
+    "Colours of the input EXR files; outputs are premultiplied, as OpenEXR prescribes."
     wrap: Literal["auto", "on", "off"] = "auto"
     "Panoramas of 360 degrees: motion and blur go on around the left and right edge."
     cuts: str | None = None
@@ -106,6 +108,7 @@ class InputSettings:
             also=self.also,
             outside=self.outside,
             wrap=self.wrap,
+            alpha=self.alpha,
         )
         clip = Clip(
             pattern,

@@ -131,6 +131,21 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
     return by_layer[chosen]
 
 
+def pictures(names: Iterable[str]) -> list[str]:
+    """The layers that are pictures by their names and channels."""
+    return [k for k, v in layers(names).items() if rgb(v) and (k == "" or stem(k) in _COLOR)]
+
+
+def layer_of(channels: Iterable[str]) -> str:
+    """The layer that channels are in: "V.Combined.R" -> "V.Combined"."""
+    return next(name for name in channels if name).rpartition(".")[0]
+
+
+def view_layer(layer: str) -> str:
+    """The view layer that a layer is of: "V.Combined" -> "V"."""
+    return layer.rpartition(".")[0]
+
+
 def rgb(members: list[str]) -> list[str]:
     """The channels of red, green, blue and alpha of a layer's; none if it is not coloured."""
     by_component = {component(m): m for m in members}

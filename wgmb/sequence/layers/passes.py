@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...errors import InputError, check_choice
 from . import vectors
+from .alpha import ALPHAS
 
 DEPTHS = ("planar", "inverse", "clip")
 
@@ -28,7 +29,8 @@ class Passes:
     display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
     (unknown if the window cuts through the picture). `wrap`: the left and the right edge are one
     meridian of an equirectangular panorama: "on", "off" or "auto" (by the attribute `envmap`, or
-    where a picture is 2:1 and its edges join or vectors are longer than half its width).
+    where a picture is 2:1 and its edges join or vectors are longer than half its width). `alpha`:
+    the colours of the files are "premultiplied" or "straight".
     """
 
     color: str | None = None
@@ -44,6 +46,7 @@ class Passes:
     also: tuple[str, ...] = ()
     outside: str = "auto"
     wrap: str = "auto"
+    alpha: str = "premultiplied"
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -60,5 +63,6 @@ class Passes:
             given = getattr(self, name)
             object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
         check_choice("`depth_kind`", self.depth_kind, DEPTHS)
+        check_choice("`alpha`", self.alpha, ALPHAS)
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")

@@ -152,7 +152,9 @@ def _is_wanted(part: str, layers: list[str]) -> bool:
 
 
 def _without_view(part: str, view: str | None) -> str:
-    """The name of a part without the view at its end: `diffuse_left` -> `diffuse`."""
+    """The name of a part without the view at its end: `diffuse_left` -> `diffuse`, `left` -> ``."""
+    if part == view:
+        return ""
     for mark in "._-":
         if view and part.endswith(mark + view):
             return part[: -len(view) - 1]

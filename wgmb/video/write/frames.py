@@ -18,7 +18,7 @@ from ...color.coding import (
 from ...color.srgb import ToDisplay, to_display
 from ...errors import InputError
 from ...io import atomic
-from .encoders import FINEST_RATE, Encoding, chosen
+from .encoders import FINEST_RATE, NO_FACTS, Encoding, Facts, chosen
 from .encoders import SUFFIXES as SUFFIXES
 from .format import VideoFormat
 from .gif import check_rate
@@ -68,8 +68,16 @@ class FrameVideo:
         self._frames = 0
         self._size: tuple[int, ...] = ()
 
-    def add(self, rgba: np.ndarray, convert: ToDisplay = to_display) -> None:
-        """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be."""
+    def add(
+        self,
+        rgba: np.ndarray,
+        convert: ToDisplay = to_display,
+        pixel_aspect: Fraction = NO_FACTS.pixel_aspect,
+    ) -> None:
+        """Append one frame of linear light, (height, width, 3 or 4); OSError if it cannot be.
+
+        `pixel_aspect`: width of a pixel to its height; that of the first frame is the video's.
+        """
         rgb = convert(rgba, 8, over_black=True)
         self._size = self._size or rgb.shape
         if rgb.shape != self._size:
@@ -82,7 +90,8 @@ class FrameVideo:
             rgb = np.pad(rgb, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
         if self._video is None:
             size = rgb.shape[1], rgb.shape[0]
-            form = VideoFormat(self._encoding, self._coding, size, self.fps, 1 / self.fps)
+            facts = Facts(pixel_aspect)
+            form = VideoFormat(self._encoding, self._coding, size, self.fps, 1 / self.fps, facts)
             self._video = VideoWriter(
                 self.path, self.temporary, form, self._texts, record=self.record
             )

@@ -124,7 +124,7 @@ class Renderer:
         subject = self.choices.subject(state)
         self.choices.close_others(state)
         size = subject.size(state)
-        shape = subject.shape if isinstance(subject, VideoSubject) else size
+        shape = size if isinstance(subject, SceneSubject) else subject.shape
         place = fit(shape, area, state)
         full_size = whole(place) if state.is_scene else size
         names = self._wanted(state)

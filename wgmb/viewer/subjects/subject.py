@@ -150,10 +150,11 @@ class ClipSubject:
     def light(self) -> np.ndarray | None:
         """The present picture alone, (height, width, 4), as its file has it.
 
-        None of a part of a picture, whose frame is drawn on a canvas of its own.
+        None of a part of a picture, whose frame is drawn on a canvas of its own, and of pixels that
+        are not square.
         """
         source = self._clip.source(*self._now[:2])
-        if source.window not in (None, (0, 0, *source.size)):
+        if source.window not in (None, (0, 0, *source.size)) or source.pixel_aspect != 1:
             return None
         return _opaque(source.rgba)
 
@@ -172,6 +173,12 @@ class ClipSubject:
     def size(self, state: State) -> tuple[int, int]:
         """Width and height of the frames [px]."""
         return self._frame(self._which(state)).size
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Width and height in square pixels, as the frame is shown."""
+        width, height = self._frame(self._now).size
+        return width * float(self._headers[self._now[:2]].pixel_aspect), height
 
     def space(self, config: ColorConfig) -> ColorSpace:
         """The colour space of the frame; InputError if it is unknown."""
