@@ -18,7 +18,7 @@ from .read.reader import VideoReader
 from .read.timeline import Times
 
 SPARE = Fraction(1, 20)  # of an output frame: less at the end, as files round times, is none
-_HELD = Fraction(1)  # of a picture's interval beyond it: less is rounding, or a guess of the muxer
+_HELD = Fraction(1, 2)  # of a picture's interval beyond it: less is rounding
 
 
 @dataclass(frozen=True)

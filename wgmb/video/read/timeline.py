@@ -37,6 +37,7 @@ _STATED = 1e-4  # the same of a rate that the file states
 _UNEVEN = 0.02  # of a step: more is a variable rate
 _JITTER = 0.25  # of a step: less is a rate all the same
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
+_ANIMATIONS = ("gif", "apng")
 _FINEST = 1_001_000  # denominator of a rate
 
 
@@ -271,7 +272,11 @@ def _keeps_count(ticks: np.ndarray, count: int) -> bool:
 
 
 def _lasting(stream: VideoStream, packets: PictureTimes, timeline: Timeline) -> Fraction:
-    """See Timeline.lasts. Durations that are all alike are those of a rate, perhaps another one."""
+    """See Timeline.lasts. Durations that are all alike are those of a rate, perhaps another one.
+
+    Only animations state a short one: elsewhere it may be the interval of a rate that the encoder
+    was told, and did not keep.
+    """
     base = stream.time_base
     if base is None or timeline.times.base != base or not packets.are_of_each:
         return Fraction(0)
@@ -279,7 +284,8 @@ def _lasting(stream: VideoStream, packets: PictureTimes, timeline: Timeline) -> 
     if stream.duration is not None and stream.start_time is not None:
         until = stream.start_time + stream.duration  # by the edit list, of an MP4
         lasts = min(lasts, until - last) if until > last else lasts
-    return lasts * base
+    states_each = stream.codec_context.name in _ANIMATIONS
+    return lasts * base if states_each or lasts * base > 1 / KNOWN_RATES[0] else Fraction(0)
 
 
 def known_rate(rate: Fraction | None) -> Fraction | None:
