@@ -218,6 +218,9 @@ def test_repeated_pictures_may_be_filled(tmp_path, capsys):
         texts[way] = run(capsys, "blur", source, *words)
     assert "repeated pictures left out" in texts["fill"] and "left out" not in texts["keep"]
     assert "8 repeated" in texts["fill"] or "7 repeated" in texts["fill"]
+    moved = write(tmp_path / "b.mp4", moving(8, 4.0), 48)
+    words = ["-o", tmp_path / "none.mkv", "--flow", "none", "--duplicates", "fill"]
+    assert "no repeated picture found" in run(capsys, "blur", moved, *words)
 
 
 def test_a_video_becomes_pictures(tmp_path, capsys):

@@ -20,6 +20,13 @@ def cuts_told(cuts: Iterable[int], noun: str) -> str:
     return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, noun)}"
 
 
+def repeats_told(count: int) -> str:
+    """The line about repeated pictures, of a run that leaves them out."""
+    return (
+        f"{counted(count, 'repeated picture')} left out" if count else "no repeated picture found"
+    )
+
+
 def conclude(report: BatchReport, target: Path, took: str, quiet: bool, verbose: bool) -> int:
     """Print a summary of the run into `target`; return the exit code."""
     for number, why in sorted(report.failed.items()):

@@ -24,9 +24,6 @@ _FAR = 0.1  # of the picture's width
 _SMALL = 96  # pixels of width of the copies that are compared where there are no vectors
 _SEARCH = 0.2  # of the width: farther nothing is looked for
 _STEP = 2  # pixels between places where a block is looked for
-SAMPLED = 480  # pixels of width that are compared to tell a copy
-_COPY = 0.5 / 255  # mean difference of display values in a copy
-_COPY_WORST = 2 / 255  # the same in one block
 _ALIKE = 0.02  # difference of display values under which there is no cut
 _UNLIKE = 0.78  # of the contrast
 _FADED = 0.6  # of the contrast, when one picture is as bright as the other
@@ -146,20 +143,6 @@ def _ways(down: int, across: int) -> list[tuple[int, int]]:
     """Displacements up to so many pixels down and across, the shortest first."""
     rows, columns = (range(-n, n + 1, _STEP) for n in (down, across))
     return sorted(product(rows, columns), key=lambda way: way[0] ** 2 + way[1] ** 2)
-
-
-def copies(a: np.ndarray, b: np.ndarray) -> bool:
-    """Return True if two pictures, of which these are pixels in even distances, are one.
-
-    Pixels are display values (height, width, 3). Codecs change a little in a copy; what moves
-    changes some place clearly.
-    """
-    if a.shape != b.shape:
-        return False
-    off = np.abs(a.astype(np.float32) - b).max(axis=2)
-    height, width = (n // BLOCK * BLOCK for n in off.shape)
-    worst = _blocks(off[:height, :width]).mean(axis=(1, 3)).max() if height and width else off.max()
-    return bool(off.mean() < _COPY and worst < _COPY_WORST)
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:

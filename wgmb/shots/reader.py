@@ -10,32 +10,18 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from ..exposure import Cell, cells_in_shot
 from ..shutter import Shutter
+from .picture import Picture as Picture
+from .repeats import Change, without_repeats
 
 REACH = 6  # pictures kept before an exposure and read beyond it, where motion looks no farther
 FLASH = 1.01 / 24  # seconds that a flash of several pictures lasts at most
 LONGEST = 10  # pictures of a flash at most
 
 T = TypeVar("T")
-
-
-@dataclass
-class Picture(Generic[T]):
-    """One picture in time."""
-
-    time: float
-    """Time at which it is first shown [s]."""
-    content: T
-    """The picture itself: whatever the reader's tests for cuts and repeats take."""
-    number: int = 0
-    """Of the frame in its file."""
-    begins_shot: bool = False
-    breaks_motion: bool = False
-    """No motion leads to it from the one before: it begins a shot, or a flash, or ends one."""
 
 
 class NoPicturesError(Exception):
@@ -47,8 +33,8 @@ class ShotReader(Generic[T]):
 
     `is_cut(before, after)`: whether a cut lies between the contents of two pictures;
     `known_cuts`: numbers of pictures that begin a shot all the same.
-    `is_double(before, after)`: whether a picture only repeats the one before; it is left out, and
-    its neighbours' cells reach over its time.
+    `change`: see repeats.py; pictures that only repeat the one before are left out, and the cells
+    of their neighbours reach over their time.
     `reach`: pictures that are kept before those asked for, and read beyond them.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much the
     file may have rounded a picture's time [s]; so much earlier, it is shown already.
@@ -60,13 +46,15 @@ class ShotReader(Generic[T]):
         *,
         is_cut: Callable[[T, T], bool] | None = None,
         known_cuts: Collection[int] = (),
-        is_double: Callable[[T, T], bool] | None = None,
+        change: Change[T] | None = None,
         reach: int = REACH,
         flash: float = FLASH,
         tolerance: float = 0.0,
     ):
-        self._pictures, self._tolerance = pictures, tolerance
-        self._is_cut, self._is_double = is_cut, is_double
+        self.doubles: list[int] = []
+        if change is not None:
+            pictures = without_repeats(pictures, change, is_cut, self.doubles)
+        self._pictures, self._tolerance, self._is_cut = pictures, tolerance, is_cut
         self._known_cuts, self._flash, self._reach = known_cuts, flash, reach
         self._kept: dict[int, Picture[T]] = {}
         self._count = 0
@@ -75,7 +63,6 @@ class ShotReader(Generic[T]):
         self._flash_ends = float("-inf")
         self.cuts: list[int] = []
         self.flashes: list[int] = []
-        self.doubles: list[int] = []
 
     def __getitem__(self, index: int) -> Picture[T]:
         """A picture that is kept; KeyError for others."""
@@ -196,15 +183,8 @@ class ShotReader(Generic[T]):
             picture = next(self._pictures, None)
             if picture is None:
                 return None
-            before = self._waiting[-1] if self._waiting else self._last
-            if before is not None and self._repeats(before, picture):
-                self.doubles.append(picture.number)
-            else:
-                self._waiting.append(picture)
+            self._waiting.append(picture)
         return self._waiting[count]
-
-    def _repeats(self, before: Picture[T], picture: Picture[T]) -> bool:
-        return self._is_double is not None and self._is_double(before.content, picture.content)
 
     def _forget_before(self, index: int) -> None:
         for old in [i for i in self._kept if i < index and i + 1 in self._kept]:

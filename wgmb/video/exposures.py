@@ -29,7 +29,7 @@ from .holdouts import Holdout
 from .output_times import OutputFrame
 from .planes import Average, Planes, averages
 from .read.reader import VideoReader
-from .thumbnail import Thumbnail, is_cut, is_double
+from .thumbnail import Thumbnail, change, is_cut
 
 Fallback = tuple[Blur, MotionSource]
 """A blur of the pictures of which the source of motion loses too much, and its own source."""
@@ -103,7 +103,7 @@ class Exposures:
             chain(begin, pictures),
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
-            is_double=is_double if self._fill else None,
+            change=change if self._fill else None,
             reach=window(size, self._motion, self._fallback and self._fallback[1]),
             flash=self._flash,
             tolerance=self._tolerance,

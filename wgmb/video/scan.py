@@ -8,7 +8,7 @@ from ..io.frame_numbers import numbered
 from ..shots.reader import Picture, ShotReader
 from ..threads import ahead
 from .read.reader import VideoReader
-from .thumbnail import Thumbnail, is_cut, is_double
+from .thumbnail import Thumbnail, change, is_cut
 
 _READ_AHEAD = 2  # coded pictures
 
@@ -25,7 +25,7 @@ def scan_video(reader: VideoReader, tell: Callable[[int, str, str], None]) -> li
             yield Picture(float(times[number]), Thumbnail(coded), number)
             tell(number, "done", "picture")
 
-    shots = ShotReader(pictures(), is_cut=is_cut, is_double=is_double)
+    shots = ShotReader(pictures(), is_cut=is_cut, change=change)
     for time in times:
         shots.at(float(time))
     lines = [("cuts", _cuts(reader, sorted(shots.cuts)))]

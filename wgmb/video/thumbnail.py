@@ -16,12 +16,8 @@ from ..color.coding import (
     Coding,
 )
 from ..color.srgb import srgb
-from ..shots.cuts import (
-    SAMPLED,
-    copies,
-    small_step,
-    smalls_differ,
-)
+from ..shots import repeats
+from ..shots.cuts import small_step, smalls_differ
 from .planes.matrices import from_samples
 
 _LUMA_ROWS = 4  # of a block of pixels, that are averaged
@@ -62,9 +58,9 @@ class Thumbnail:
 
     @cached_property
     def sampled(self) -> np.ndarray:
-        """(height, width, 3) display values of pixels in even distances, at least SAMPLED a row."""
+        """(height, width, 3) display values of pixels in even distances, at least 480 a row."""
         width, height = self.coded.size
-        step = max(1, width // SAMPLED)
+        step = max(1, width // repeats.SAMPLED)
         planes = []
         for plane in self._colors:
             wide, high = self._steps(plane)
@@ -164,6 +160,6 @@ def is_cut(before: Thumbnail, after: Thumbnail) -> bool:
     return smalls_differ(before.small, after.small)
 
 
-def is_double(before: Thumbnail, after: Thumbnail) -> bool:
-    """Return True if a picture only repeats the one before."""
-    return copies(before.sampled, after.sampled)
+def change(before: Thumbnail, after: Thumbnail) -> np.ndarray:
+    """The energy of the change from one picture to another, see shots/repeats.py."""
+    return repeats.change(before.sampled, after.sampled)

@@ -10,7 +10,7 @@ from ...errors import counted
 from ...run.trial.trial import Trial
 from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
-from ..conclusion import cuts_told
+from ..conclusion import cuts_told, repeats_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
 from ..spelling import as_options
@@ -46,8 +46,8 @@ def blur_video(
             note(cuts_told(report.cuts, "picture"))
         if report.flashes:
             note(f"flash at picture {', '.join(map(str, report.flashes))}")
-        if report.repeated:
-            note(f"{report.repeated} repeated pictures left out")
+        if run.request.video.duplicates == "fill":
+            note(repeats_told(report.repeated))
         if report.held_out:
             note(as_options(report.held_out))
         if report.lost:

@@ -14,6 +14,7 @@ from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
+from ..conclusion import repeats_told
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import outputs_of, videos_of
 from ..spelling import as_options
@@ -76,8 +77,8 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
     if not quiet:
         took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
         words = [took if report.is_new else "", *report.left_out, *report.notes]
-        if report.repeated:
-            words.append(f"{report.repeated} repeated pictures left out")
+        if report.is_new and run.request.video.duplicates == "fill":
+            words.append(repeats_told(report.repeated))
         words += [report.held_out, report.lost, report.scaling]
         note(as_options(f"{path}: {'; '.join(filter(None, words))} -> {report.output}"))
     if report.loss:

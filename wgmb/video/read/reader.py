@@ -42,6 +42,7 @@ from .side_data import SideData, light_level_of, mastering_of, side_data_of
 from .timeline import Times, scanned
 
 PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
+_OF_FILM = Fraction(30_000, 1001)  # frames a second of television to which film is spread (2:3)
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
 
 
@@ -165,10 +166,13 @@ class VideoReader:
         if self.assumed:
             self.notes.append(f"does not state its colours: {', '.join(self.assumed)} assumed")
         if self.is_interlaced:
+            film = self._packets.rate == _OF_FILM
             self.notes.append(
                 f"interlaced: each of its {len(self._packets.times)} frames is taken as two "
                 f"pictures ({float(self.rate):g} a second)"
-            )
+                + ("; if it was made of film, `ffmpeg -i IN -vf fieldmatch,decimate OUT` undoes "
+                   "that first" if film else "")
+            )  # fmt: skip
         if many := len(self._packets.repeated):
             at = float(int(self._packets.repeated[0]) * self._packets.times.base)
             have = "picture has" if many == 1 else "pictures have"

@@ -19,7 +19,7 @@ from ...shots.reader import NoPicturesError, Picture, ShotReader
 from ...video.holdouts import NONE, Held, holdout_of
 from ...video.motion import VideoMotion
 from ...video.read.reader import VideoReader
-from ...video.thumbnail import Thumbnail, is_cut, is_double
+from ...video.thumbnail import Thumbnail, change, is_cut
 
 _BEFORE = 10  # pictures before one that may have a say in its motion, or in where its shot begins
 _EARLIER = 8  # more of them read at first, so that going back does not begin anew at each step
@@ -131,7 +131,7 @@ class PictureFinder:
             self._pictures(first),
             is_cut=self._is_cut if self._cuts.is_search else None,
             known_cuts=self._cuts.frames(0),
-            is_double=is_double if self._fill else None,
+            change=change if self._fill else None,
             reach=window(self._reader.size, self._source),
             tolerance=self._reader.tolerance,
         )
