@@ -204,3 +204,9 @@ def test_a_python_that_is_too_old_is_one_line(line, said):
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == said
     assert len(done.stderr.splitlines()) == 1 or "ImportError" in said
+
+
+def test_an_entry_of_the_changelog_is_one_short_line():
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert [line for line in text.splitlines() if len(line) > 160] == []
+    assert not re.search(r"\bdB\b|FLIP", text), "scores stand on the pages of the laboratory"
