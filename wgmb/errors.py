@@ -12,7 +12,7 @@ spells it as its option.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 TYPE_CHECKING = False  # typing's own, without the time that loading it takes
@@ -64,6 +64,53 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
 
     close = get_close_matches(str(word), [str(k) for k in known], n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+_MEANT = {  # names that people know from other programs, and the setting that they look for
+    "shutter": "angle shutter_angle shutter_degrees amount blur_amount blur strength",
+    "streams video": "no_audio no_sound audio sound mute an no_subtitles",
+    "fps": "framerate frame_rate rate output_fps fps_out",
+    "fps_in": "input_fps source_fps",
+    "output": "out to destination",
+    "adapter": "gpu",
+    "device": "gpu adapter",
+    "begin": "start ss from_time",
+    "end": "stop duration until",
+    "quality": "crf qp cq",
+    "codec": "vcodec video_codec",
+    "holdout": "mask masks",
+    "overwrite": "force yes y",
+    "workers": "threads jobs processes cores",
+    "frames": "range frame_range",
+    "flow none": "no_flow",
+    "cuts none": "no_cuts",
+    "duplicates fill": "deduplicate dedup",
+    "samples": "spp quality_samples steps",
+}
+_NEAR = 0.75  # of difflib's ratio, from which a name is taken for a slip
+
+
+def meant_setting(name: str, known: Collection[str]) -> tuple[str, str]:
+    """The setting among the `known` that a wrong name means, and the value it takes then, or "".
+
+    Names are written with underscores. ("", "") where no setting is near: a guess would mislead.
+    """
+    from difflib import SequenceMatcher  # only when something is wrong
+
+    for meant, words in _MEANT.items():
+        setting, _, value = meant.partition(" ")
+        if name in words.split() and setting in known:
+            return setting, value
+    near = {k: SequenceMatcher(None, name, k).ratio() for k in known}
+    best = max(near, key=near.__getitem__, default="")
+    is_slip = best and (near[best] >= _NEAR or sorted(name) == sorted(best))
+    return (best, "") if is_slip else ("", "")
+
+
+def did_you_mean_setting(name: str, known: Collection[str]) -> str:
+    """The end of a message about a keyword that is not among the `known` ones, if one is meant."""
+    setting, value = meant_setting(name, known)
+    return f"; did you mean {f'{setting}={value!r}' if value else repr(setting)}?" * bool(setting)
 
 
 def counted(number: int, noun: str) -> str:

@@ -141,8 +141,23 @@ def test_cuts_that_change_nothing_are_said(tmp_path, capsys, shot):
     line = ("blur", shot, "-o", tmp_path / "o.####.exr", "--cuts", "3,40,50")
     code, _, err = make.inside(capsys, *line)
     assert code == 0
-    assert "cuts outside the frames 1 to 3 change nothing: 40,50\n" in err
+    assert "no shot begins at the cuts 40,50: the frames are 1 to 3\n" in err
     assert "camera cut before frame 3\n" in err
+
+
+@pytest.mark.parametrize(
+    ("cuts", "said"),
+    [
+        ("only:99", "--cuts only:99: no cut is searched for, so the frames are one shot"),
+        ("none", ""),
+    ],
+)
+def test_cuts_that_switch_the_search_off_say_what_they_do(tmp_path, capsys, shot, cuts, said):
+    """It said that it changed nothing; `none` was refused."""
+    words = "--method", "tap", "--cuts", cuts
+    code, _, err = make.inside(capsys, "blur", shot, "-o", tmp_path / "o.####.exr", *words)
+    assert code == 0
+    assert (said in err) and ("one shot" in err) == bool(said)
 
 
 def test_settings_are_written_into_every_frame(tmp_path, capsys, shot):

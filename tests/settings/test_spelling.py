@@ -8,7 +8,7 @@ import pytest
 
 import make_frames as make
 import wgmb
-from wgmb import InputError
+from wgmb import InputError, errors
 from wgmb.cli import app
 from wgmb.cli.spelling import as_options, options
 from wgmb.errors import check_choice
@@ -165,6 +165,33 @@ def test_every_choice_that_is_nearly_right_is_recognised(
     assert code == 2
     assert err.count("\n") == 1
     assert re.search(rf"[Dd]id you mean ['\"]?{meant}['\"]?\?", err)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("--no-audio", "--streams video"), ("--mute", "--streams video"), ("--angle", "--shutter"),
+        ("--shutter-angle", "--shutter"), ("--fsp", "--fps"), ("--framerate", "--fps"),
+        ("--crf", "--quality"), ("--gpu", "--adapter"), ("--threads", "--workers"),
+        ("--shuter", "--shutter"), ("--over-write", "--overwrite"), ("--log", ""), ("--json", ""),
+        ("--bitrate", ""), ("--nonsense", ""),
+    ],
+)  # fmt: skip
+def test_a_wrong_option_names_what_people_mean_or_nothing(capsys, name, meant):
+    """`--no-audio` was told to be --ocio, `--angle` --scale, `--json` --job."""
+    code, _, err = make.inside(capsys, "blur", "a.mp4", "-o", "b.mp4", name, "60")
+    end = f"; did you mean {meant}?" if meant else ""
+    assert (code, err) == (2, f"wgmb: unknown option {name}{end}\n")
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("meant", sorted(errors._MEANT))
+def test_what_is_suggested_exists(capsys, meant):
+    setting, _, value = meant.partition(" ")
+    words = ["blur", "a.mp4", "-o", "b.mp4", f"--{setting.replace('_', '-')}", value or "1"]
+    _, _, err = make.inside(capsys, *words)
+    assert "unknown option" not in err or setting == "device"  # of Python's calls
 
 
 @pytest.mark.fast

@@ -233,7 +233,7 @@ def test_cuts_that_no_frame_has_are_known(tmp_path):
     assert Clip(pattern, cuts="2,4,5,9").stray_cuts == [5, 9]  # 4: after the last frame
 
 
-@pytest.mark.parametrize("cuts", ["only:9", "only:3"])
+@pytest.mark.parametrize("cuts", ["only:9", "only:3", "none"])
 def test_no_cut_is_looked_for_where_all_are_known(tmp_path, cuts):
     """Two shots, as test_cuts.py has them; the second begins with frame 4."""
     pattern = make.write_sequence(tmp_path, [1, 2, 3])

@@ -217,7 +217,7 @@ def test_the_picture_at_a_time_is_found_exactly():
             ["CLIP", "--fps-in", "3"],
             "--fps-in is for `wgmb blur`: the viewer shows frames at their",
         ),
-        (["CLIP", "--nonsense", "3"], "Unknown option: --nonsense"),
+        (["CLIP", "--nonsense", "3"], "unknown option --nonsense"),
         (["CLIP", "--fps"], "view needs --fps and its value"),
         (["CLIP", "--frames", "5-99"], "0 to 23"),
         (["CLIP", "--begin", "0.1", "--frames", "5-9"], "choose either --frames, or --begin"),

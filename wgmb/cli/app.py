@@ -25,6 +25,7 @@ from ..errors import (
     Error,
     InputError,
     did_you_mean,
+    meant_setting,
 )
 from ..extras import EXTRAS, reason
 from . import terminal
@@ -115,9 +116,8 @@ def main(arguments: list[str] | None = None) -> int:
         terminal.flush()
         return result if isinstance(result, int) else DONE
     except cyclopts.UnknownOptionError as error:
-        return _say_why(
-            f"{_elsewhere(words, error) or _of_file(error) or error}{_hint(words)}", USAGE
-        )
+        why = _elsewhere(words, error) or _unknown(words, error)
+        return _say_why(f"{why}{_hint(words)}", USAGE)
     except cyclopts.CycloptsError as error:
         return _say_why(f"{_plainly(str(error), words)}{_hint(words)}", USAGE)
     except DeviceError as error:
@@ -157,14 +157,28 @@ def _check_text(words: list[str]) -> None:
             raise InputError(f"{shown}: not UTF-8; please rename the file or folder") from None
 
 
-def _of_file(error: cyclopts.UnknownOptionError) -> str:
-    """The message about a name in a --config file that is no option; '' for others."""
-    if error.token is None or error.token.source == "cli":
-        return ""
-    name = (error.token.keyword or "").strip("[]")
-    close = re.search(r"Did you mean --([a-z-]+)", str(error))
-    hint = f"; did you mean {close[1].replace('-', '_')!r}?" if close else ""
-    return f"{error.token.source}: unknown option {name}{hint}"
+def _unknown(words: list[str], error: cyclopts.UnknownOptionError) -> str:
+    """The message about an option of the command line, or of a --config file, that is none."""
+    if error.token is None:
+        return str(error)
+    name = (error.token.keyword or error.token.value).strip("[]")
+    known = {one.removeprefix("--").replace("-", "_") for one in _options(words[0])}
+    setting, value = meant_setting(name.lstrip("-").replace("-", "_"), known)
+    if error.token.source != "cli":
+        meant = f"{setting} = {value!r}" if value else repr(setting)
+        return f"{error.token.source}: unknown option {name}" + (
+            f"; did you mean {meant}?" if setting else ""
+        )
+    meant = f"--{setting.replace('_', '-')}{' ' * bool(value)}{value}"
+    return f"unknown option {name}" + (f"; did you mean {meant}?" if setting else "")
+
+
+def _options(command: str) -> set[str]:
+    """The options of a command by their names."""
+    if command not in COMMANDS:
+        return set()
+    found = make_app(command)[command].assemble_argument_collection()
+    return {name for one in found for name in one.names if name.startswith("--")}
 
 
 def _plainly(text: str, words: list[str]) -> str:
@@ -194,10 +208,7 @@ def _elsewhere(words: list[str], error: cyclopts.UnknownOptionError) -> str:
     name = error.token.keyword or error.token.value if error.token else ""
     if words[:1] != ["view"]:
         return ""
-    known = {
-        n for one in make_app("blur")["blur"].assemble_argument_collection() for n in one.names
-    }
-    if name not in known:
+    if name not in _options("blur"):
         return ""
     why = "the viewer shows frames at their own rate"
     why = why if name == "--fps-in" else "the viewer writes no files by options"

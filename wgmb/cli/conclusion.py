@@ -50,7 +50,7 @@ def conclude(report: BatchReport, target: Path, took: str, quiet: bool, verbose:
             note(f"{mask} is in no pixel of these frames, so it changed nothing")
         if stray := report.stray_cuts:
             there = "{} to {}".format(*report.on_disk)
-            note(f"cuts outside the frames {there} change nothing: {frame_list(stray)}")
+            note(f"no shot begins at the cuts {frame_list(stray)}: the frames are {there}")
         if report.cuts:
             note(cuts_told(report.cuts, "frame"))
         if odd := odd_sizes({n: size for size, at in report.sizes.items() for n in at}):

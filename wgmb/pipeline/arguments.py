@@ -9,7 +9,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..errors import InputError, check_choice, did_you_mean
+from ..errors import InputError, check_choice, did_you_mean_setting
 from ..methods import METHODS, check_method
 from ..methods.options import options_of
 from ..shutter import Shutter, Weight
@@ -56,7 +56,7 @@ def _no_option(method: str, unknown: list[str], own: list[str]) -> str:
     text = f"method {method!r} has no option {', '.join(unknown)}"
     if others:
         return f"{text}, but {' and '.join(others)}; it has {', '.join(own) or 'none'}"
-    hint = did_you_mean(unknown[0], [*own, *_OF_ALL])
+    hint = did_you_mean_setting(unknown[0], [*own, *_OF_ALL])
     return f"{text}; it has {', '.join(own + _OF_ALL)}{hint}"
 
 

@@ -35,6 +35,7 @@ from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
 from ..settings.record import record
 from ..settings.video import VideoSettings
+from ..shots.cut_list import CutList
 from ..threads import Stop
 from .conversion import RateConversion
 from .needs import check_needs
@@ -194,7 +195,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         check_method(request.blur.method, FRAME_METHODS)
     clip, shown = request.opened()
     clip.builder.check_layers()
-    remarks = list(map(_of_scale, request.blur.scale))
+    remarks = [*map(_of_scale, request.blur.scale), _of_cuts(request.input.cuts, clip)]
     if request.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
     request = replace(request, averages=_averages(clip, request))
@@ -229,6 +230,14 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         remarks.append(f"the frames have no vectors; motion: {how}")
     told = tuple(filter(None, remarks))
     return Job(request, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+
+
+def _of_cuts(cuts: str | None, clip: Clip) -> str:
+    """A remark where a list has no cut of these frames, and none are searched for."""
+    known = CutList(cuts or "")
+    if known.is_search or not clip.stray_cuts or len(clip.stray_cuts) < len(known.frames(0)):
+        return ""
+    return f"`cuts` {cuts}: no cut is searched for, so the frames are one shot; none says the same"
 
 
 def _of_scale(scale: str) -> str:

@@ -196,6 +196,9 @@ class PictureBlur(Iterator[Any]):
         return library.from_dlpack(array)  # pyright: ignore[reportOptionalMemberAccess]
 
 
+_OWN = "fps_in", "fps", "transfer", "holdout", "device"  # keywords of blur_pictures itself
+
+
 def blur_pictures(
     pictures: Iterable[Any],
     *,
@@ -232,7 +235,7 @@ def blur_pictures(
     if not isinstance(pictures, Iterable) and not hasattr(pictures, "__getitem__"):
         raise InputError(f"pictures must be an iterable of arrays, got {type(pictures).__name__}")
     rate = _RATE if fps_in is None else _rate("fps_in", fps_in)
-    request, _ = request_of(dict(settings), PictureKeywords)
+    request, _ = request_of(dict(settings), PictureKeywords, _OWN)
     if isinstance(holdout, np.ndarray) and request.video.flow == "none":
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     request.video.expansion.check_pictures(transfer not in ("linear", "pq", "hlg"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any, Literal, Unpack, get_args, get_origin, get_type_hints
 import wgpu
 
 from .. import gpu
-from ..errors import InputError, check_choice, did_you_mean
+from ..errors import InputError, check_choice, did_you_mean_setting
 from ..extras import install_command, is_installed
 from ..methods import FRAME_METHODS, check_method
 from ..methods.keywords import MethodKeywords
@@ -364,22 +364,23 @@ def blur_video(
 
     Example: wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180)
     """
-    request, keywords = request_of(dict(settings), VideoKeywords)
+    request, keywords = request_of(dict(settings), VideoKeywords, ("device", "progress"))
     run = request.open(device)
     options = chosen(OutputSettings, keywords | {"output": str(output)})
     return run(run.plan(source, options), progress)
 
 
 def request_of(
-    keywords: dict[str, Any], options: type[PictureKeywords]
+    keywords: dict[str, Any], options: type[PictureKeywords], own: Collection[str] = ()
 ) -> tuple[VideoRequest, dict[str, Any]]:
     """The request of a user's keywords, and the keywords as the settings hold them.
 
-    InputError for one that is not among the `options`.
+    InputError for one that is not among the `options`. `own`: further keywords of the function,
+    which may be meant.
     """
     hints = get_type_hints(options)
     if unknown := sorted(keywords.keys() - hints.keys()):
-        near = did_you_mean(unknown[0], list(hints))
+        near = did_you_mean_setting(unknown[0], [*hints, *own])
         raise InputError(f"unknown setting {unknown[0]!r}{near}")
     for name, kind in hints.items():
         if name in keywords and get_origin(kind) is Literal and name not in _CHECKED:

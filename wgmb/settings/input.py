@@ -57,7 +57,7 @@ class InputSettings:
     "Panoramas of 360 degrees: motion and blur go on around the left and right edge."
     cuts: str | None = None
     """Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 switches the
-    detection off.
+    detection off; none: no cuts.
     """
     view: str | None = None
     "One view of stereo frames, such as left; by default all are blurred."

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..extras import needed_by
 from ..io.frame_numbers import frame_numbers, readable
 
-_ONLY = "only:"
+_ONLY, _NONE = "only:", "none"
 _FILE = re.compile(r"(?P<path>.*\.(?P<kind>edl|otio))(?:@(?P<fps>.*))?", re.IGNORECASE | re.DOTALL)
 _MOST_BYTES = 16 << 20
 _DEEPEST = 500  # lists within lists
@@ -32,7 +32,8 @@ class CutList:
     """Cuts as the user gives them.
 
     `text`: frames that begin a new shot, such as "101,155", or a file, `cut.edl[@FPS]` or
-    `cut.otio[@FPS]`; "only:" before it switches the search for other cuts off.
+    `cut.otio[@FPS]`; "only:" before it switches the search for other cuts off; "none": there are
+    no cuts, and none are searched for.
     """
 
     text: str = ""
@@ -40,7 +41,7 @@ class CutList:
     @property
     def is_search(self) -> bool:
         """True if cuts are searched for in the pictures too."""
-        return not self.text.startswith(_ONLY)
+        return self.text != _NONE and not self.text.startswith(_ONLY)
 
     @property
     def path(self) -> Path | None:
@@ -50,7 +51,7 @@ class CutList:
 
     @property
     def _plain(self) -> str:
-        return self.text.removeprefix(_ONLY)
+        return "" if self.text == _NONE else self.text.removeprefix(_ONLY)
 
     def anchored(self, folder: Path) -> CutList:
         """The same, its file named from `folder` on."""
@@ -63,8 +64,10 @@ class CutList:
     def frames(self, first: int) -> frozenset[int]:
         """The frames that begin a new shot; `first`: the frame with which a file's edit begins."""
         if not self._plain:
-            if self.text:
-                raise InputError(f"cuts {self.text!r}: must name cuts, such as only:101,155")
+            if self.text not in ("", _NONE):
+                raise InputError(
+                    f"cuts {self.text!r}: must name cuts, such as only:101,155; none: no cuts"
+                )
             return frozenset()
         found = _FILE.fullmatch(self._plain)
         if found is None:
