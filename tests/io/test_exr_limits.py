@@ -1,5 +1,6 @@
 """EXR files that would unpack to gigabytes are refused by their headers."""
 
+import struct
 import subprocess
 import sys
 import textwrap
@@ -141,3 +142,46 @@ def test_a_description_holds_no_more_than_the_file_does(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "not finite or not in front of the camera: 2 pixels of color" in said
     assert peak < 30e6, peak  # 12 MB are stored; it was 39
+
+
+def deep(path, samples: int = 2, **attributes):
+    """A deep EXR of 16 x 8 pixels, each with so many samples of R, G, B, A and Z."""
+    planes = {name: np.empty((8, 16), object) for name in "RGBAZ"}
+    for plane in planes.values():
+        for place in np.ndindex(*plane.shape):
+            plane[place] = np.full(samples, 0.5, "f4")
+    header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.deepscanline}
+    OpenEXR.File(header | attributes, planes).write(str(path))
+    return path
+
+
+def test_the_samples_of_deep_pixels_are_counted_behind_a_header_of_any_length(tmp_path):
+    path = deep(tmp_path / "a.exr", 400, comment="x" * (17 << 20))
+    with pytest.raises(InputError, match="deep, would decode to"):
+        exr.read(path, max_mb=1)
+    assert exr.read(path).parts[0].channels["Z"].shape == (8, 16)
+
+
+@pytest.mark.parametrize(
+    ("offset", "message"),
+    [(0, "a chunk is at 0 of"), (1 << 40, "a chunk is at 1099511627776 of"),
+     (300, "no chunk|bytes of a chunk")],
+)  # fmt: skip
+def test_deep_samples_that_cannot_be_counted_are_refused(tmp_path, monkeypatch, offset, message):
+    path = deep(tmp_path / "a.exr")
+    data = path.read_bytes()
+    header = OpenEXR.File(str(path), header_only=True).parts[0].header
+    with open(path, "rb") as file:
+        exr.deep._skip_headers(file, len(data))
+        at = file.tell()
+    assert header["chunkCount"] == 8
+    path.write_bytes(data[:at] + struct.pack("<Q", offset) + data[at + 8 :])
+    plain = OpenEXR.File
+
+    def header_alone(*arguments, **options):
+        assert options.get("header_only")
+        return plain(*arguments, **options)
+
+    monkeypatch.setattr(OpenEXR, "File", header_alone)
+    with pytest.raises(InputError, match=rf"a\.exr: its deep samples cannot be counted.*{message}"):
+        exr.read(path)

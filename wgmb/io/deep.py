@@ -7,6 +7,7 @@ a point at its front. OpenEXR, "Interpreting OpenEXR Deep Pixels".
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Collection, Mapping, Sequence
@@ -16,6 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import InputError
+from . import limits
 
 _COLORS = ("r", "g", "b", "a", "y", "red", "green", "blue", "alpha")
 _NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"}
@@ -23,6 +25,9 @@ _MOST_HALF = float(np.finfo(np.float16).max)
 _OBJECT = 256  # bytes that the library takes for a pixel's samples of a channel, beside them
 _MANY_PARTS = 0x1000
 _MOST = 1 << 40  # bytes of a chunk: more is damage
+_MOST_CHUNKS = 1 << 18  # of a part: 8192 x 8192 pixels in tiles of 16
+_MOST_ATTRIBUTES = 1 << 16  # of a part
+_LONGEST_NAME = 255  # bytes, of an attribute or its type
 
 
 @np.errstate(all="ignore")  # samples may be anything
@@ -144,26 +149,32 @@ def _summed(samples: np.ndarray, transmittance: np.ndarray, counts: np.ndarray) 
 def needed(path: Path, parts: Sequence[Any]) -> int:
     """Bytes that the deep parts of a file take in memory, from the headers of their chunks.
 
-    `parts`: of OpenEXR.File, without pixels. What is damaged counts as nothing: reading the
-    pixels tells.
+    `parts`: of OpenEXR.File, without pixels. InputError where they cannot be counted.
     """
     try:
         with open(path, "rb") as file:
             return _needed(file, parts)
-    except (struct.error, IndexError, ValueError, KeyError, OSError, OverflowError):
-        return 0
+    except (struct.error, IndexError, ValueError, KeyError, OSError, OverflowError) as error:
+        raise InputError(
+            f"{path}: its deep samples cannot be counted, it is damaged or cut off: {error}"
+        ) from None
 
 
 def _needed(file: BinaryIO, parts: Sequence[Any]) -> int:
-    many = _skip_headers(file)
+    stored = os.fstat(file.fileno()).st_size
+    many = _skip_headers(file, stored)
     at, total = file.tell(), 0
     for part in parts:
         count, channels = int(part.header["chunkCount"]), part.header["channels"]
+        if count < 1:
+            raise ValueError(f"states {count} chunks")
+        limits.held("chunks", count, 8, stored)
         if "deep" in part.header["type"].name:
+            limits.held("chunks", count, 1, _MOST_CHUNKS)
             is_tile = "tile" in part.header["type"].name
             file.seek(at)
-            offsets = np.frombuffer(file.read(8 * count), "<u8")
-            unpacked = sum(_unpacked(file, int(offset), many, is_tile) for offset in offsets)
+            offsets = np.frombuffer(file.read(8 * count), "<u8").tolist()
+            unpacked = sum(_unpacked(file, each, stored, many, is_tile) for each in offsets)
             (left, top), (right, bottom) = part.header["dataWindow"]
             pixels = (int(right) - int(left) + 1) * (int(bottom) - int(top) + 1)
             filled = min(pixels, unpacked // (2 * len(channels)))
@@ -172,32 +183,45 @@ def _needed(file: BinaryIO, parts: Sequence[Any]) -> int:
     return total
 
 
-def _unpacked(file: BinaryIO, offset: int, many: bool, is_tile: bool) -> int:
-    """Bytes of the samples of one chunk; 0 for a smaller level of a tiled part."""
+def _unpacked(file: BinaryIO, offset: int, stored: int, many: bool, is_tile: bool) -> int:
+    """Bytes of the samples of one chunk; 0 for a smaller level of a tiled part.
+
+    ValueError where the chunk is not in the file: the library would look for it elsewhere.
+    """
+    length = 4 * many + (16 if is_tile else 4) + 24
+    if not 8 <= offset <= stored - length:
+        raise ValueError(f"a chunk is at {offset} of {stored} bytes")
     file.seek(offset + 4 * many)
     place = struct.unpack("<4i" if is_tile else "<i", file.read(16 if is_tile else 4))
-    _, _, unpacked = struct.unpack("<3Q", file.read(24))
+    counts, packed, unpacked = struct.unpack("<3Q", file.read(24))
+    limits.held("bytes of a chunk", counts + packed, 1, stored - offset - length)
     if unpacked > _MOST:
         raise ValueError("no chunk is so large")
     return 0 if is_tile and place[2:] != (0, 0) else unpacked
 
 
-def _skip_headers(file: BinaryIO) -> bool:
+def _skip_headers(file: BinaryIO, stored: int) -> bool:
     """Go to the first table of offsets; returns True if the file is of the form with many parts."""
     _, version = struct.unpack("<2I", file.read(8))
     many = bool(version & _MANY_PARTS)
-    data = file.read(1 << 24)
-    at = 0
-    while True:
-        while data[at]:  # attributes: name, type, size, value
-            kind = data.index(b"\0", at) + 1
-            size = data.index(b"\0", kind) + 1
-            at = size + 4 + struct.unpack_from("<I", data, size)[0]
-        at += 1
-        if not many:
-            break
-        if not data[at]:
-            at += 1
-            break
-    file.seek(8 + at)
+    count = 0
+    while _skip_header(file, stored) and many:
+        if (count := count + 1) > limits.MOST_CHANNELS:
+            raise ValueError(f"over {limits.MOST_CHANNELS} parts")
     return many
+
+
+def _skip_header(file: BinaryIO, stored: int) -> bool:
+    """Go behind one header; False for the empty one that ends those of a file with many parts."""
+    for count in range(_MOST_ATTRIBUTES):
+        begin = file.tell()
+        text = file.read(2 * _LONGEST_NAME + 6)  # name, type, size
+        if not text[0]:
+            file.seek(begin + 1)
+            return count > 0
+        kind = text.index(b"\0") + 1
+        size = text.index(b"\0", kind) + 1
+        (length,) = struct.unpack_from("<I", text, size)
+        limits.held("bytes of an attribute", length, 1, stored - begin)
+        file.seek(begin + size + 4 + length)
+    raise ValueError(f"over {_MOST_ATTRIBUTES} attributes")
