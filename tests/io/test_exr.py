@@ -1,5 +1,8 @@
 """EXR files: each compression, fewer layers, sizes that differ."""
 
+import struct
+from fractions import Fraction
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -189,3 +192,37 @@ def test_windows_that_differ_within_one_display_are_no_other_size(tmp_path, caps
                        display=(0, 0, 63, 47))  # fmt: skip
     code, _, err = blur(capsys, tmp_path / "s.####.exr", tmp_path / "o.####.exr")
     assert (code, "another size" in err) == (0, False)
+
+
+EVERY = [name for name in dir(OpenEXR) if name.endswith("_COMPRESSION")]
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_same_keeps_the_ids_of_a_cryptomatte_in_all_that_the_library_knows(tmp_path, name):
+    rng = np.random.default_rng(7)
+    ids = rng.integers(0, 2**32, (64, 64), np.uint32).view("f4")
+    given = channels(64, 64) | {f"Crypto00.{c}": ids for c in "RGBA"}
+    plain = exr.read(make.write_exr(tmp_path / "a.exr", given, CRYPTO))
+    plain.parts[0].compression = getattr(OpenEXR, name)
+    out = tmp_path / "o.exr"
+    try:
+        out.write_bytes(exr.encode(plain, "same"))
+    except InputError as error:
+        assert "cannot be written" in str(error)
+        return
+    planes = {k: v for part in exr.read(out).parts for k, v in part.channels.items()}
+    assert all(planes[f"Crypto00.{c}"].tobytes() == ids.tobytes() for c in "RGBA")
+
+
+@pytest.mark.parametrize("value", [(0, 0), (1, 0), (-(2**31), 0)])
+def test_an_attribute_that_is_divided_by_0_is_left_out_and_named(tmp_path, value):
+    path = tmp_path / "a.exr"
+    OpenEXR.File({"framesPerSecond": Fraction(24, 1), "owner": "me"}, channels()).write(str(path))
+    data, lead = path.read_bytes(), b"framesPerSecond\0rational\0\x08\0\0\0"
+    at = data.index(lead) + len(lead)
+    path.write_bytes(data[:at] + struct.pack("<iI", *value) + data[at + 8 :])
+    for header_only in (True, False):
+        part = exr.read(path, header_only=header_only).parts[0]
+        assert part.attributes["owner"] == "me" and "framesPerSecond" not in part.attributes
+        assert part.notes == ("attribute framesPerSecond is divided by 0, and left out",)
+    np.testing.assert_array_equal(part.channels["R"], channels()["R"])

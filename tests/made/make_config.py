@@ -57,4 +57,4 @@ def light(channels=3, seed=3) -> np.ndarray:
 
 def samples(path: Path) -> np.ndarray:
     """The integers in a PNG."""
-    return stills._read_png(path.read_bytes(), lambda width, height: None)
+    return stills._read_png(path.read_bytes(), lambda *_: None)

@@ -17,17 +17,14 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import InputError
-from . import limits
+from . import exr_headers, limits
 
 _COLORS = ("r", "g", "b", "a", "y", "red", "green", "blue", "alpha")
 _NOT_COLORS = {"n", "normal", "normals", "p", "position", "id"}
 _MOST_HALF = float(np.finfo(np.float16).max)
 _OBJECT = 256  # bytes that the library takes for a pixel's samples of a channel, beside them
-_MANY_PARTS = 0x1000
 _MOST = 1 << 40  # bytes of a chunk: more is damage
 _MOST_CHUNKS = 1 << 18  # of a part: 8192 x 8192 pixels in tiles of 16
-_MOST_ATTRIBUTES = 1 << 16  # of a part
-_LONGEST_NAME = 255  # bytes, of an attribute or its type
 
 
 @np.errstate(all="ignore")  # samples may be anything
@@ -162,8 +159,8 @@ def needed(path: Path, parts: Sequence[Any]) -> int:
 
 def _needed(file: BinaryIO, parts: Sequence[Any]) -> int:
     stored = os.fstat(file.fileno()).st_size
-    many = _skip_headers(file, stored)
-    at, total = file.tell(), 0
+    many, _, at = exr_headers.read(file)
+    total = 0
     for part in parts:
         count, channels = int(part.header["chunkCount"]), part.header["channels"]
         if count < 1:
@@ -198,30 +195,3 @@ def _unpacked(file: BinaryIO, offset: int, stored: int, many: bool, is_tile: boo
     if unpacked > _MOST:
         raise ValueError("no chunk is so large")
     return 0 if is_tile and place[2:] != (0, 0) else unpacked
-
-
-def _skip_headers(file: BinaryIO, stored: int) -> bool:
-    """Go to the first table of offsets; returns True if the file is of the form with many parts."""
-    _, version = struct.unpack("<2I", file.read(8))
-    many = bool(version & _MANY_PARTS)
-    count = 0
-    while _skip_header(file, stored) and many:
-        if (count := count + 1) > limits.MOST_CHANNELS:
-            raise ValueError(f"over {limits.MOST_CHANNELS} parts")
-    return many
-
-
-def _skip_header(file: BinaryIO, stored: int) -> bool:
-    """Go behind one header; False for the empty one that ends those of a file with many parts."""
-    for count in range(_MOST_ATTRIBUTES):
-        begin = file.tell()
-        text = file.read(2 * _LONGEST_NAME + 6)  # name, type, size
-        if not text[0]:
-            file.seek(begin + 1)
-            return count > 0
-        kind = text.index(b"\0") + 1
-        size = text.index(b"\0", kind) + 1
-        (length,) = struct.unpack_from("<I", text, size)
-        limits.held("bytes of an attribute", length, 1, stored - begin)
-        file.seek(begin + size + 4 + length)
-    raise ValueError(f"over {_MOST_ATTRIBUTES} attributes")

@@ -16,7 +16,7 @@ import numpy as np
 import OpenEXR
 
 from ..errors import InputError, check_choice
-from . import chroma, deep, limits, lossy
+from . import chroma, deep, exr_headers, limits, lossy
 from .exr_library import hushed, inside
 from .limits import MOST_PIXELS_A_SIDE
 
@@ -109,9 +109,9 @@ def read(
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     with inside():
-        header = _open(path, header_only=True)
+        header, unknown = _open(path, header_only=True)
     try:
-        promised = [_promised(path, part) for part in header.parts]
+        promised = [_promised(path, part, unknown) for part in header.parts]
         is_deep = [part.header.get("type") in _DEEP for part in header.parts]
     except (UnicodeDecodeError, KeyError, TypeError, IndexError) as error:
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
@@ -126,7 +126,7 @@ def read(
         what += " deep,"
     limits.check(path, what, needed, path.stat().st_size, max_mb)
     with inside(), hushed() as heard:
-        content = _open(path, header_only=False)
+        content, _ = _open(path, header_only=False)
     if len(content.parts) != len(promised):
         if _short_of_memory(heard, needed):
             raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels")
@@ -251,11 +251,17 @@ def to_half(values: np.ndarray) -> np.ndarray:
 
 
 def _open(path: Path, *, header_only: bool):
+    """The library's file, and the names of attributes that no number can hold."""
+    options = {"separate_channels": True, "header_only": header_only}
     try:
-        return OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+        try:
+            return OpenEXR.File(str(path), **options), set()
+        except ZeroDivisionError:
+            stream, unknown = exr_headers.with_rationals(path)
+            return OpenEXR.File(stream, **options), unknown
     except MemoryError:
         raise InputError(f"{path}: not enough memory to read it") from None
-    except (RuntimeError, ValueError, TypeError, OSError) as error:
+    except (RuntimeError, ValueError, TypeError, OSError, ArithmeticError) as error:
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
 
 
@@ -271,8 +277,8 @@ def _short_of_memory(heard: list[str], needed: int) -> bool:
     return False
 
 
-def _promised(path: Path, part: Any) -> Part:
-    """Return the part as declared by its header, with empty arrays."""
+def _promised(path: Path, part: Any, unknown: Collection[str]) -> Part:
+    """Return the part that its header declares, with empty arrays, without `unknown` attributes."""
     header = part.header
     data, display = (_corners(header[k]) for k in ("dataWindow", "displayWindow"))
     width, height = data[2] - data[0] + 1, data[3] - data[1] + 1
@@ -284,8 +290,10 @@ def _promised(path: Path, part: Any) -> Part:
     if not channels:
         raise InputError(f"{path}: has a part without channels")
     attributes = {k: v for k, v in header.items() if k not in _WRITTEN_ANEW}
+    lost = [name for name in unknown if attributes.pop(name, None) is not None]
+    notes = tuple(f"attribute {name} is divided by 0, and left out" for name in sorted(lost))
     name, compression = header.get("name", "") or "", header["compression"]
-    return Part(name, channels, attributes, data, display, compression)
+    return Part(name, channels, attributes, data, display, compression, notes)
 
 
 def _corners(box: Any) -> tuple[int, int, int, int]:
