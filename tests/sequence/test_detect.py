@@ -176,13 +176,13 @@ def test_frames_are_taken_together_before_a_flip_is_decided():
 
 def test_no_more_pixels_are_compared_than_said(monkeypatch):
     compared = []
-    look_up = vector_test._bilinear
+    look_up = vector_test.bilinear
 
     def counting(image, where):
         compared.append(len(where))
         return look_up(image, where)
 
-    monkeypatch.setattr(vector_test, "_bilinear", counting)
+    monkeypatch.setattr(vector_test, "bilinear", counting)
     monkeypatch.setattr(vector_test, "_PROBES", 300)
     monkeypatch.setattr(vector_test, "_ROUGHLY", 90)
     vector_test.decide(told("plain"), [evidence(n, lambda v: v / 2) for n in (2, 5, 7)])

@@ -152,7 +152,7 @@ def test_the_picture_is_not_read_as_vectors(tmp_path, capsys):
 # ---- stills that hold numbers ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("most", [16.0, 64.0])
+@pytest.mark.parametrize("most", [16.0, pytest.param(64.0, marks=pytest.mark.full)])
 @pytest.mark.parametrize(("form", "kind"), [("png", "u1"), ("png", "u2"), ("tif", "u2")])
 def test_motion_around_half_is_found_with_its_unit(tmp_path, form, kind, most):
     """As After Effects and ReelSmart Motion Blur take it: y up, 1 is a motion of `most` px."""
@@ -366,7 +366,7 @@ def test_names_that_programs_give_to_vectors_are_known(tmp_path, names, up):
     is_right(Clip(of_layers(tmp_path, lambda n: {names: to_next(n) * turned})), 0)
 
 
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("sign", [-1, pytest.param(1, marks=pytest.mark.full)])
 @pytest.mark.parametrize(
     "names",
     [("motionFore.x,motionFore.y", "motionBack.x,motionBack.y"),
@@ -408,3 +408,64 @@ def test_where_there_is_no_vector_nothing_moves(convention, number):
     got = vectors.read(channels, Vectors(convention))
     assert (got[:6] == 0).all()
     np.testing.assert_array_equal(got[6:, :, 2:], to_next(5)[6:])
+
+
+# ---- depth ----------------------------------------------------------------------------------
+
+KINDS = {  # numbers of a distance
+    "planar": lambda z: z,
+    "white-near": lambda z: (10 - z) / 8,
+    "1 / z": lambda z: 1 / z,
+    "along the axis towards the camera": lambda z: -z,
+}
+
+
+def of_depth(folder, numbers, empty=None):
+    """Frames whose square is nearer than the background, and the pattern."""
+    for n in NUMBERS:
+        inside = to_next(n).any(axis=2)
+        depth = numbers(np.where(inside, 3.0, 9.0)).astype("f4")
+        if empty is not None:
+            depth[:5] = empty
+        make.write_exr(folder / f"s.{n:04d}.exr", make.frame(n, "nuke") | {"Z": depth})
+    return folder / "s.####.exr"
+
+
+def order_of(clip: Clip) -> np.ndarray:
+    """Depth of the square and of the background of frame 5."""
+    depth, inside = clip.frame(clip.source(5)).depth, to_next(5).any(axis=2)
+    return np.array([np.nanmedian(depth[inside]), np.nanmedian(depth[~inside])])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind):
+    pattern = of_depth(tmp_path, KINDS[kind])
+    clip = Clip(pattern)
+    near, far = order_of(clip)
+    assert 0 < near < far
+    told = [text for text in clip.notes if "larger depth is nearer" in text]
+    assert len(told) == (kind != "planar")
+    if kind != "1 / z":
+        assert (near, far) == pytest.approx({"white-near": (1 / 0.875, 8)}.get(kind, (3, 9)))
+    settled = Clip(pattern, settled=clip.settle())
+    assert tuple(order_of(settled)) == (near, far)
+    code, out, _ = make.inside(capsys, "info", pattern)
+    assert code == 0
+    assert ("larger depth is nearer" in out) == (kind != "planar")
+
+
+@pytest.mark.parametrize("empty", [np.inf, 1e10, np.nan, 0.0])
+def test_empty_depth_does_not_turn_its_order(tmp_path, empty):
+    clip = Clip(of_depth(tmp_path, KINDS["planar"], empty))
+    assert tuple(order_of(clip)) == (3, 9)
+    assert not clip.notes
+
+
+def test_the_kind_of_depth_is_told_instead(tmp_path):
+    clip = Clip(of_depth(tmp_path, KINDS["white-near"]), passes=Passes(depth_kind="planar"))
+    assert tuple(order_of(clip)) == pytest.approx((0.875, 0.125))
+    assert not clip.notes
+    clip = Clip(of_depth(tmp_path, KINDS["planar"]), passes=Passes(depth_kind="white-near"))
+    assert tuple(order_of(clip)) == pytest.approx((1 / 3, 1 / 9))
+    with pytest.raises(InputError, match="needs distances"):
+        Passes(depth_kind="white-near", camera=tmp_path / "c.json")

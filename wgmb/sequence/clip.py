@@ -122,11 +122,13 @@ class Clip:
         if self._settled is None:
             self.masks.check()
             beyond, is_joined = self._neighbours.beyond, self._neighbours.is_joined
+            depth_kind = self._finder.depth_kind
             notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
             self._settled = SequenceFindings(
                 tuple(self.on_disk),
                 self.views,
                 self._finder.finding,
+                depth_kind,
                 tuple(sorted(self._known_cuts)),
                 beyond,
                 is_joined,

@@ -23,6 +23,8 @@ class SequenceFindings:
     """Names of the views, the default one first."""
     finding: ConventionFinding
     """Meaning of the vectors."""
+    depth_kind: str
+    """Kind of the depth."""
     cuts: tuple[int, ...]
     """Frames that begin a shot, as the user or an edit says."""
     beyond: Sides
@@ -39,6 +41,7 @@ class SequenceFindings:
             "on_disk": ranges(self.on_disk),
             "views": list(self.views),
             "finding": finding,
+            "depth_kind": self.depth_kind,
             "cuts": list(self.cuts),
             "beyond": list(self.beyond),
             "is_joined": self.is_joined,

@@ -152,7 +152,10 @@ class FrameBuilder:
         if name is None:
             return None
         depth = source.channels[name].astype(np.float32, copy=False)
-        if passes.depth_kind == "inverse":
+        kind = self._finder.depth_kind
+        if kind == "white-near" and (depth < 0).any():  # places along the axis towards the camera
+            return np.where(depth < 0, -depth, np.inf).astype(np.float32)
+        if kind in ("inverse", "white-near"):
             with np.errstate(divide="ignore"):
                 depth = np.where(depth > 0, 1 / depth, np.inf).astype(np.float32)
         return depth

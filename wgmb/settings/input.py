@@ -41,8 +41,10 @@ class InputSettings:
     "JSON file with a camera per frame, for motion from depth where vectors are missing."
     depth: str | None = None
     "Depth layer, if it cannot be found by name."
-    depth_kind: Literal["planar", "inverse", "clip"] = "planar"
-    "Depth convention: distance along the view axis, its inverse (Nuke), or z after projection."
+    depth_kind: Literal["auto", "planar", "inverse", "clip", "white-near"] = "auto"
+    """Depth convention: distance along the view axis, its inverse (Nuke), z after projection, or
+    larger is nearer; auto: planar, or white-near where the frames show it.
+    """
     far: float = 1e9
     "Depth from which a pixel counts as empty (sky)."
     object_layer: str | None = None

@@ -9,7 +9,7 @@ from ...errors import InputError, check_choice
 from . import vectors
 from .alpha import ALPHAS
 
-DEPTHS = ("planar", "inverse", "clip")
+DEPTHS = ("auto", "planar", "inverse", "clip", "white-near")
 
 
 @dataclass(frozen=True)
@@ -17,15 +17,16 @@ class Passes:
     """Layers to read from the files, and their conventions.
 
     `color`, `depth`: names of layers that cannot be found automatically. `depth_kind`: "planar"
-    (distance along the view axis), "inverse" (its reciprocal, Nuke), or "clip" (z after
-    projection). `camera`: JSON file (see CameraFile) for motion where vectors are missing.
-    `object_layer`: index layer that identifies the camera file's objects. `object_motion`:
-    vectors exclude the camera's motion. `holdout`, `scale`: masks, each a layer, `LAYER=VALUE`,
-    or an image file or pattern; VALUE is an index, or a name (with wildcards) or id of a
-    Cryptomatte. The holdout is the union of all masks. The scales multiply; `MASK:AMOUNT`
-    stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with additional layers of the
-    same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth from
-    which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
+    (distance along the view axis), "inverse" (its reciprocal, Nuke), "clip" (z after projection),
+    "white-near" (larger is nearer, and nothing else is known of it; not with a camera), or "auto":
+    planar, or white-near where what covers what shows it. `camera`: JSON file (see CameraFile) for
+    motion where vectors are missing. `object_layer`: index layer that identifies the camera file's
+    objects. `object_motion`: vectors exclude the camera's motion. `holdout`, `scale`: masks, each a
+    layer, `LAYER=VALUE`, or an image file or pattern; VALUE is an index, or a name (with wildcards)
+    or id of a Cryptomatte. The holdout is the union of all masks. The scales multiply;
+    `MASK:AMOUNT` stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with more layers of
+    the same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth
+    from which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
     display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
     (unknown if the window cuts through the picture). `wrap`: the left and the right edge are one
     meridian of an equirectangular panorama: "on", "off" or "auto" (by the attribute `envmap`, or
@@ -36,7 +37,7 @@ class Passes:
     color: str | None = None
     vectors: vectors.Vectors = field(default_factory=vectors.Vectors)
     depth: str | None = None
-    depth_kind: str = "planar"
+    depth_kind: str = "auto"
     far: float = 1e9
     camera: Path | None = None
     object_layer: str | None = None
@@ -64,5 +65,9 @@ class Passes:
             object.__setattr__(self, name, (given,) if isinstance(given, str) else tuple(given))
         check_choice("`depth_kind`", self.depth_kind, DEPTHS)
         check_choice("`alpha`", self.alpha, ALPHAS)
+        if self.camera is not None and self.depth_kind == "white-near":
+            raise InputError(
+                "motion from `camera` needs distances: `depth_kind` planar, inverse or clip"
+            )
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")

@@ -1,9 +1,10 @@
-"""Meaning of a sequence's vectors, decided once for all of its frames."""
+"""Meaning of a sequence's vectors and depth, decided once for all of its frames."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..data_windows import (
 )
 from ..frame_cache import FrameCache
 from ..frame_file import FrameFile
-from . import light, vector_test, vectors
+from . import depth_order, light, names, vector_test, vectors
 
 Look = Callable[[FrameFile], np.ndarray | None]
 """Image of a frame on which vectors are tested, (height, width, 3 or 4); None if it has none."""
@@ -27,12 +28,17 @@ def _picture(source: FrameFile) -> np.ndarray:
 
 
 class ConventionFinder:
-    """The vector convention of the frames in `stored`. `known`: what was found before, if
-    anything.
+    """The vector convention, and the kind of depth, of the frames in `stored`. `known` and
+    `known_depth`: those found before, if any.
     """
 
-    def __init__(self, stored: FrameCache, known: vector_test.ConventionFinding | None):
-        self._stored, self.known = stored, known
+    def __init__(
+        self,
+        stored: FrameCache,
+        known: vector_test.ConventionFinding | None,
+        known_depth: str | None = None,
+    ):
+        self._stored, self.known, self.known_depth = stored, known, known_depth
         self._wanted = stored.passes.vectors
 
     @property
@@ -133,12 +139,60 @@ class ConventionFinder:
         if seen is None:
             return vector_test.Evidence(doubt="no picture to test it on")
         motion = vectors.read(self._stored.own(source), named, source.reference_channel)
+        seen, motion, prev, next_ = self._aligned(source, (seen, motion), look)
+        return vector_test.gathered(seen, motion, prev, next_, source.whole)
+
+    def _aligned(self, source: FrameFile, arrays: Sequence[np.ndarray], look: Look) -> list[Any]:
+        """Arrays of a frame, and the images before and after it (or None), in one window."""
         near = [self._probe(source, side, look) for side in (-1, 1)]
         near = [one if one and near_enough(source.data_window, one[1]) else None for one in near]
         onto = union([source.data_window, *(window for _, window in filter(None, near))])
-        color, motion = (laid(a, source.data_window, onto) for a in (seen, motion))
-        prev, next_ = (one and laid(*one, onto) for one in near)
-        return vector_test.gathered(color, motion, prev, next_, source.whole)
+        own = [laid(a, source.data_window, onto) for a in arrays]
+        return own + [one and laid(*one, onto) for one in near]
+
+    @property
+    def depth_kind(self) -> str:
+        """The kind of depth: as it was asked for, or found by what covers what."""
+        asked = self._stored.passes.depth_kind
+        if asked != "auto":
+            return asked
+        if self.known_depth is None:
+            self.known_depth = self._find_depth_kind()
+        return self.known_depth
+
+    def _find_depth_kind(self) -> str:
+        finding, there = self.finding, self._stored.files.on_disk
+        if finding.vectors is None or not finding.sure or self._stored.passes.camera is not None:
+            return "planar"
+        total = depth_order.Votes()
+        for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                found = self._depth_votes(self._named(number)[0], finding.vectors)
+                total += found or depth_order.Votes()
+                if found is None or total.is_enough:
+                    break
+        if not total.is_reversed:
+            return "planar"
+        text = (
+            f"larger depth is nearer, as what covers what shows in {total.farther} of "
+            f"{total.count} places; `depth_kind=planar` reads it otherwise"
+        )
+        self._stored.notes[text] = list(self._stored.numbers)
+        return "white-near"
+
+    def _depth_votes(self, source: FrameFile, named: vectors.Vectors) -> depth_order.Votes | None:
+        """The votes of a frame about its depth; None if it has none."""
+        own, near = self._stored.own(source), source.reference_channel
+        name = names.find_depth(own, self._stored.passes.depth, near)
+        if name is None or near is None:
+            return None
+        motion, depth = vectors.read(own, named, near), own[name].astype(np.float32)
+        color, motion, depth, prev, next_ = self._aligned(
+            source, (source.rgba, motion, depth), _picture
+        )
+        sides = (motion[..., :2], prev), (motion[..., 2:], next_)
+        found = [depth_order.votes(color, m, depth, c) for m, c in sides if c is not None]
+        return sum(found, depth_order.Votes())
 
     def _probe(self, source: FrameFile, side: int, look: Look) -> tuple[np.ndarray, Window] | None:
         """The image of a neighbour, by `look`, and its data window, to test vectors on."""

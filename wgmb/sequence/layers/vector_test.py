@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .tones import bilinear, tone
 from .vectors import Vectors
 
 _PROBES = 20_000  # pixels compared at most
@@ -32,7 +33,6 @@ _NOTHING = 1e-5  # vectors that are shorter everywhere are 0, whatever their uni
 _TOP = 0.999  # quantile of the speeds that is the fastest of vectors of an unknown unit
 _SLOW = 0.05  # of it: slower pixels say nothing
 _FEWEST = 16  # moving pixels that say anything
-_BRIGHT = 1e4  # light beyond this is all the same
 _MOST = 0.3  # difference of tones beyond which a pixel has merely changed
 _EXPLAINS = 0.9  # what a right reading leaves at most of the unmoved difference
 _CLEARLY = 0.75  # another reading must leave less than this share of the difference
@@ -99,7 +99,7 @@ def gathered(
     not there, or of another size, is None. `whole`: width and height of the display window.
     """
     sides = {
-        side: (m, _tone(c[..., :3]))
+        side: (m, tone(c[..., :3]))
         for side, m, c in ((-1, motion[..., :2], prev), (1, motion[..., 2:], next_))
         if c is not None and c.shape[:2] == color.shape[:2]
     }
@@ -109,13 +109,13 @@ def gathered(
     at = _some(speeds > _MOVING)
     fastest, is_below = _fastest(speeds, at), len(at) < _FEWEST
     if is_below:
-        here = _tone(color[..., :3])
+        here = tone(color[..., :3])
         differs = any(_differ(here, tone) for _, tone in sides.values())
         at = _some(speeds > max(_SLOW * fastest, _NOTHING))
         if not differs or len(at) < _FEWEST:
             return Evidence(fastest=fastest, is_below=True, differs=differs, doubt=_NOTHING_MOVES)
     y, x = at.T
-    tones, places = _tone(color[y, x, :3]), at[:, ::-1].astype(np.float32)
+    tones, places = tone(color[y, x, :3]), at[:, ::-1].astype(np.float32)
     lookups = [(tones, places, m[y, x], tone) for m, tone in sides.values()]
     size = whole or color.shape[1::-1]
     return Evidence(lookups, tuple(sides), fastest, is_below, is_below, size)
@@ -341,7 +341,7 @@ class _Probes:
         total, count = 0.0, 0
         for side, here, at, motion, neighbour in self._lookups:
             turned = -factor if reading.is_turned and side < 0 else factor
-            there = _bilinear(neighbour, at + motion * turned)
+            there = bilinear(neighbour, at + motion * turned)
             total += float(np.minimum(np.abs(there - here).sum(axis=1), _MOST).sum())
             count += len(here)
         return total / count
@@ -373,21 +373,3 @@ def _differ(a: np.ndarray, b: np.ndarray) -> bool:
     blocks = apart.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, 3).mean(axis=(1, 3))
     changed, (fewest, share) = np.abs(blocks).max(axis=2) > _CHANGED, _CHANGES
     return int(changed.sum()) >= max(fewest, share * changed.size)
-
-
-def _tone(color: np.ndarray) -> np.ndarray:
-    """Float16, held to 0..1 without hard limit, so that one highlight does not decide."""
-    light = np.clip(np.nan_to_num(color.astype(np.float32)), 0, _BRIGHT)
-    return (light / (1 + light)).astype(np.float16)
-
-
-def _bilinear(image: np.ndarray, where: np.ndarray) -> np.ndarray:
-    height, width = image.shape[:2]
-    x = np.clip(where[:, 0], 0, width - 1.001)
-    y = np.clip(where[:, 1], 0, height - 1.001)
-    left, top = x.astype(int), y.astype(int)
-    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    u, v = (x - left)[:, None], (y - top)[:, None]
-    upper = (1 - u) * image[top, left] + u * image[top, right]
-    lower = (1 - u) * image[below, left] + u * image[below, right]
-    return (1 - v) * upper + v * lower
