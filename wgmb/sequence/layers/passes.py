@@ -26,8 +26,8 @@ class Passes:
     or id of a Cryptomatte. The holdout is the union of all masks. The scales multiply;
     `MASK:AMOUNT` stands for 1 + (AMOUNT - 1) * mask. `also`: patterns of files with more layers of
     the same frames. In the names of files, %V stands for the view (see Clip.views). `far`: depth
-    from which a pixel counts as empty. `outside`: the picture beyond a data window that ends within the
-    display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
+    from which a pixel counts as empty. `outside`: the picture beyond a data window that ends within
+    the display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
     (unknown if the window cuts through the picture). `wrap`: the left and the right edge are one
     meridian of an equirectangular panorama: "on", "off" or "auto" (by the attribute `envmap`, or
     where a picture is 2:1 and its edges join or vectors are longer than half its width). `alpha`:
