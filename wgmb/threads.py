@@ -37,6 +37,49 @@ def is_main() -> bool:
     return threading.current_thread() is threading.main_thread()
 
 
+class ThreadClock:
+    """Seconds of the processor that one thread takes; those of all where only that is known."""
+
+    def __init__(self) -> None:
+        self._of: int | None = None
+        self._begun = time.process_time()
+
+    def begin(self) -> None:
+        """Take those of the thread that calls this."""
+        if hasattr(time, "pthread_getcpuclockid"):
+            self._of = time.pthread_getcpuclockid(threading.get_ident())
+
+    def seconds(self) -> float:
+        """Seconds since it was made; 0 for a thread that has ended."""
+        if self._of is None:
+            return time.process_time() - self._begun
+        try:
+            return time.clock_gettime(self._of)
+        except OSError:
+            return 0.0
+
+
+def apart(work: Callable[[], _Item], check: Callable[[], None] = lambda: None) -> _Item:
+    """The result of `work`, made in a thread of its own, so that Ctrl-C does not wait for it.
+
+    What `work` raises is raised here. `check` is called every 0.05 s, and may raise: that ends the
+    wait, as an interruption does. The thread then goes on until `work` ends, or the program does.
+    """
+    done: queue.SimpleQueue[list[_Item] | BaseException] = queue.SimpleQueue()
+
+    def make() -> None:
+        try:
+            done.put([work()])
+        except BaseException as error:  # raised where it is waited for
+            done.put(error)
+
+    begin(make, "apart")
+    entry = _taken(done, check)
+    if isinstance(entry, BaseException):
+        raise entry
+    return entry.pop()
+
+
 def ahead(
     items: Iterator[_Item],
     count: int = 1,

@@ -22,6 +22,10 @@ MAX_MB = 4096
 """Megabytes that a file may unpack to unless another limit is given."""
 _TIMES = 500  # as much as the file holds: then it is all but empty, or was made to do harm
 _SHARE = 4  # and may take this part of the limit
+INDEX_SHARE = 8
+"""Part of the limit that a file's index, and the search for its form, may take."""
+_INDEX_ENTRY = 64  # bytes that an entry of an index takes in memory, at most
+LARGEST_INDEX = 64 << 20  # bytes that a compressed index may unpack to
 
 
 def unpacked(size: tuple[int, int], channels: int) -> int:
@@ -36,8 +40,7 @@ def check(path: Path, name: str, promised: int, stored: int, max_mb: float) -> N
     size may take a quarter of `max_mb`: a black frame does so, and so does a bomb. InputError for a
     limit that is none.
     """
-    if not max_mb > 0:
-        raise InputError(f"`max_mb` must be above 0 megabytes, got {max_mb:g}")
+    check_limit(max_mb)
     thin = promised > _TIMES * stored
     most = max_mb / _SHARE if thin else max_mb
     if promised <= most * 2**20:
@@ -96,3 +99,45 @@ def whole(path: Path, most: int, kind: str) -> bytes:
 
 def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def check_limit(max_mb: float) -> None:
+    """Raise InputError for a limit that is none."""
+    if not max_mb > 0:
+        raise InputError(f"`max_mb` must be above 0 megabytes, got {max_mb:g}")
+
+
+def check_index(entries: int, stored: int, max_mb: float) -> None:
+    """Raise ValueError where an index of so many samples is more than a file may ask for.
+
+    Each stands for a byte of the file at least, so that a file of `stored` bytes has no more of
+    them; and the index takes an eighth of `max_mb` at most.
+    """
+    if entries > stored:
+        raise ValueError(f"states {entries:,} samples, too many for its {stored:,} bytes")
+    if (promised := entries * _INDEX_ENTRY) > max_mb / INDEX_SHARE * 2**20:
+        needed = -(-promised * INDEX_SHARE // 2**20)
+        raise ValueError(
+            f"the index of its {entries:,} samples would take {-(-promised // 2**20)} MB, "
+            f"the limit is {max_mb / INDEX_SHARE:g} MB; `max_mb={needed}` allows it"
+        )
+
+
+def check_packets(path: Path, count: int, size: int, stored: int) -> None:
+    """Raise InputError where `count` packets of `size` bytes in all cannot come from a file.
+
+    Each stands for a byte of it at least, and all of them are 500 times as long at most, as where a
+    container compresses what is black.
+    """
+    if count > stored or size > _TIMES * stored:
+        raise InputError(
+            f"{path}: gives {count:,} packets and {size:,} bytes already, "
+            f"too many for a file of {stored:,} bytes"
+        )
+
+
+def most_pixels(stored: int, channels: int, max_mb: float) -> int:
+    """Pixels of the largest picture that `check` lets through, of so many channels as float32."""
+    check_limit(max_mb)
+    whole = min(max_mb, max(_TIMES * stored / 2**20, max_mb / _SHARE))
+    return int(whole * 2**20) // (4 * channels)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 from pathlib import Path
 
@@ -13,8 +14,13 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from ...errors import InputError
+from ...io import limits, watch
 from ...io.frame_numbers import readable
+from .boxes import boxes, check_counts
 
+HELD_CHANNELS = 12
+"""Channels as float32 that a blur holds of a picture: coded ones, five as light, the sums."""
+_MOST_PIXELS = 2**31 - 1  # that FFmpeg's option takes
 _BEGINNING = 1 << 20  # bytes
 _LONGEST = 60.0, 60.0  # seconds that opening, and reading once, may take
 _LISTS = b"ffconcat", b"#EXTM3U", b"v=0", b"<?xml", b"<MPD"  # that name other files
@@ -32,18 +38,25 @@ READERS = (
 _BOXES = (b"ftyp", b"mdat", b"wide", b"free", b"skip", b"pnot")  # that begin an MP4 or MOV
 
 
-def opened(path: Path) -> InputContainer:
+def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False) -> InputContainer:
     """The file, open for reading; InputError in one line that names it.
 
-    Nothing else is read: no other file, and nothing from a network, whatever it refers to.
+    Nothing else is read: no other file, and nothing from a network, whatever it refers to. Its
+    index may take an eighth of `max_mb` megabytes (see limits.py), unless the file `is_known` from
+    an opening before. Larger pictures than that allows are not decoded. Ctrl-C does not wait.
     """
     if not readable(path):
         raise InputError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
     if not path.stat().st_size:
         raise InputError(f"{path}: is empty")
-    try:
-        return av.open(
+    stored = path.stat().st_size
+
+    def work() -> InputContainer:
+        if not is_known:
+            check_counts(path, max_mb)
+        container = av.open(
             f"file:{os.fspath(path)}",
+            options=bound,
             container_options={
                 "protocol_whitelist": "file",
                 "format_whitelist": READERS,
@@ -51,8 +64,30 @@ def opened(path: Path) -> InputContainer:
             timeout=_LONGEST,
             metadata_errors="replace",
         )
+        bound_pictures(container, bound)
+        return container
+
+    bound = largest_picture(stored, max_mb)
+    try:
+        return watch.watched(path, work, stored, math.inf if is_known else max_mb)
     except (FFmpegError, OSError, UnicodeError) as error:
         raise InputError(f"{path}: {_what_is_wrong(path, error)}") from None
+
+
+def largest_picture(stored: int, max_mb: float) -> dict[str, str]:
+    """FFmpeg's option that bounds the pictures of a file of `stored` bytes; see limits.check.
+
+    Codecs round sizes up to their blocks, so that it is an eighth more.
+    """
+    most = limits.most_pixels(stored, HELD_CHANNELS, max_mb)
+    return {"max_pixels": str(min(most + most // 8, _MOST_PIXELS))}
+
+
+def bound_pictures(container: InputContainer, bound: dict[str, str]) -> None:
+    """Bound the pictures that the decoders make, whose size may change within a stream."""
+    for stream in container.streams.video:
+        if stream.codec_context is not None:
+            stream.codec_context.options = stream.codec_context.options | bound
 
 
 def picture_stream(container: InputContainer, path: Path | str) -> VideoStream:
@@ -98,22 +133,10 @@ def _what_is_wrong(path: Path, error: Exception) -> str:
 
 def _lacks_index(path: Path) -> bool:
     """Return True for an MP4 or MOV whose boxes end without a moov."""
-    size, at, first = path.stat().st_size, 0, True
+    kinds: list[bytes] = []
     with open(path, "rb") as file:
-        while at + 8 <= size:
-            file.seek(at)
-            head = file.read(16)
-            length, kind = int.from_bytes(head[:4], "big"), head[4:8]
-            if first and kind not in _BOXES:
+        for box in boxes(file, 0, path.stat().st_size):
+            if box.kind == b"moov" or (not kinds and box.kind not in _BOXES):
                 return False
-            if kind == b"moov":
-                return False
-            first = False
-            if length == 1:
-                length = int.from_bytes(head[8:16], "big")
-            if length == 0:  # to the end of the file
-                return True
-            if length < 8:
-                return False
-            at += length
-    return not first
+            kinds.append(box.kind)
+    return bool(kinds)

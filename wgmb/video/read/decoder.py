@@ -23,8 +23,8 @@ REORDERED = 12  # pictures that are looked at to tell times of decoding from tim
 class Decoder:
     """Decodes one stream of a file, whose pictures are shown at the times of a Timeline."""
 
-    def __init__(self, path: Path, index: int, timeline: Timeline):
-        self._path, self._index, self._timeline = path, index, timeline
+    def __init__(self, path: Path, index: int, timeline: Timeline, max_mb: float):
+        self._path, self._index, self._timeline, self._max_mb = path, index, timeline, max_mb
 
     def frames(self, first: int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Frames and their numbers, which ascend, from one at or before `first` on.
@@ -52,7 +52,7 @@ class Decoder:
         if first >= len(self._timeline.times):
             return
         for key in [*self._keys_before(first), None]:
-            with opened(self._path) as container:
+            with opened(self._path, self._max_mb, is_known=True) as container:
                 stream = cast(VideoStream, container.streams[self._index])
                 stream.thread_type = "SLICE" if careful else "AUTO"
                 if key is not None:

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from av.packet import Packet
+
+from ...io import limits
+
+
+def justified(packets: Iterable[Packet[Any]], path: Path) -> Iterator[Packet[Any]]:
+    """The packets of a file; InputError once they are more than a file of its size can hold."""
+    stored, read = path.stat().st_size, 0
+    for count, packet in enumerate(packets):
+        read += packet.size
+        limits.check_packets(path, count, read, stored)
+        yield packet
 
 
 class PictureTimes:

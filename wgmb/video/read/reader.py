@@ -23,7 +23,8 @@ from av.video.stream import VideoStream
 
 from ...color.coding import CodedPicture
 from ...errors import InputError, counted
-from ...io import limits
+from ...io import limits, watch
+from ...threads import apart
 from ..hdr10 import is_base_layer
 from ..pixels import (
     THREADS,
@@ -34,7 +35,7 @@ from ..pixels import (
 )
 from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
-from .container import opened, picture_stream
+from .container import HELD_CHANNELS, opened, picture_stream
 from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
@@ -43,6 +44,7 @@ from .timeline import Times, scanned
 
 PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
 _OF_FILM = Fraction(30_000, 1001)  # frames a second of television to which film is spread (2:3)
+_PACE = 1 << 20  # bytes of a file whose packets are listed in a second of the processor, at least
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
 
 
@@ -58,9 +60,6 @@ class OtherStream:
     title: str
     text: str
     """Its kind in words, such as "aac, 48000 Hz, stereo"."""
-
-
-_HELD_CHANNELS = 12  # as float32, of what a blur holds: coded pictures, five as light, the sums
 
 
 class VideoReader:
@@ -84,7 +83,7 @@ class VideoReader:
         self.scaled: set[int] = set()
         self._is_at_end = False
         self.notes: list[str] = []
-        with opened(self.path) as container:
+        with opened(self.path, max_mb) as container:
             stream = picture_stream(container, self.path)
             self.index = stream.index
             self._check_size(stream, max_mb)
@@ -97,7 +96,10 @@ class VideoReader:
             self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
             if stream.metadata.get("alpha_mode") == "1":
                 self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
-            self._packets = scanned(container, stream)
+            stored = self.path.stat().st_size
+            self._packets = watch.watched(
+                self.path, lambda: scanned(container, stream, self.path), stored, max_mb, _PACE
+            )
         if not len(self._packets.times):
             raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
         if self._packets.goes_back is not None:
@@ -107,7 +109,8 @@ class VideoReader:
                 f"{float(before):.2f} to {float(after):.2f} s; `ffmpeg -i IN -c copy OUT.mkv` "
                 "puts its parts one after the other"
             )
-        self._probe()
+        self._max_mb = max_mb
+        apart(self._probe)
 
     def _check_size(self, stream: VideoStream, max_mb: float) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
@@ -120,7 +123,7 @@ class VideoReader:
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
                 f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
             )
-        promised = limits.unpacked((width, height), _HELD_CHANNELS)
+        promised = limits.unpacked((width, height), HELD_CHANNELS)
         stored = self.path.stat().st_size
         limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
 
@@ -128,7 +131,7 @@ class VideoReader:
         """Decode one picture: what it says of itself counts more than what the header says."""
         if self._packets.is_encrypted:  # some of its noise may be taken for pictures
             raise InputError(f"{self.path}: is encrypted")
-        with opened(self.path) as container:
+        with opened(self.path, self._max_mb, is_known=True) as container:
             stream = cast(VideoStream, container.streams[self.index])
             frames = decoded(container, stream)
             frame = next(frames, None)
@@ -158,7 +161,7 @@ class VideoReader:
                 self._packets = self._packets.from_picture(first)
                 lost = counted(first, "picture")
                 self.notes.append(f"left out at its beginning: {lost}, not decodable alone")
-        self._decoder = Decoder(self.path, self.index, self._packets)
+        self._decoder = Decoder(self.path, self.index, self._packets, self._max_mb)
         self._timeline = self._packets.doubled() if self.is_interlaced else self._packets
         self._note(side)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -16,18 +17,23 @@ from av.video.reformatter import VideoReformatter
 
 from ...color.coding import CodedPicture
 from ...errors import InputError, counted
-from ...io import limits
+from ...io import limits, watch
 from ..pixels import is_transparent, layout, planes_of
 from ..write.encoders import Facts
 from .color_tags import COLORS, assumed, either, tags_of
-from .container import READERS, picture_stream
+from .container import (
+    HELD_CHANNELS,
+    READERS,
+    bound_pictures,
+    largest_picture,
+    picture_stream,
+)
 from .rotation import rotation_of
 from .side_data import light_level_of, mastering_of, side_data_of
 from .timeline import known_rate
 
 _JITTER = Fraction(1, 4)  # of an interval
 _SELDOM, _FEW = 0.05, 2  # pictures of all, and at least, that may come at another time
-_CHANNELS = 12  # as float32, of what a blur holds of a picture
 _LACKS = Fraction(1, 10)  # seconds that a stream may be shorter than it states, and an interval
 
 
@@ -56,15 +62,11 @@ class StreamReader:
         self._failed, self._uneven = 0, 0
         self._source = _Source(stream)
         try:
-            self._container = av.open(
-                self._source,
-                "r",
-                container_options={"protocol_whitelist": "pipe", "format_whitelist": READERS},
-                metadata_errors="replace",
-            )
+            self._container = watch.watched(name, self._opened, 0, max_mb)
         except (FFmpegError, UnicodeError, ValueError):
             self._source.check()
             raise InputError(f"{name}: {_what_is_wrong(self._source.beginning)}") from None
+        bound_pictures(self._container, largest_picture(sys.maxsize, max_mb))
         self._stream = picture_stream(self._container, name)
         context = self._stream.codec_context
         self._check_size((context.width, context.height), max_mb)
@@ -103,11 +105,19 @@ class StreamReader:
             kinds = ", ".join(dict.fromkeys(others))
             self.notes.append(f"only its pictures go through a pipe; left out: {kinds}")
 
+    def _opened(self) -> InputContainer:
+        return av.open(
+            self._source,
+            "r",
+            container_options={"protocol_whitelist": "pipe", "format_whitelist": READERS},
+            metadata_errors="replace",
+        )
+
     def _check_size(self, size: tuple[int, int], max_mb: float) -> None:
         if not 0 < min(size) <= max(size) <= limits.MOST_PIXELS_A_SIDE:
             raise InputError(f"{self.name}: pictures of {size[0]} x {size[1]}, expected 1 to "
                              f"{limits.MOST_PIXELS_A_SIDE} pixels a side")  # fmt: skip
-        promised = limits.unpacked(size, _CHANNELS)
+        promised = limits.unpacked(size, HELD_CHANNELS)
         limits.check(Path(self.name), f"{size[0]} x {size[1]}", promised, promised, max_mb)
 
     def pictures(self) -> Iterator[tuple[int, CodedPicture]]:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
 from typing import overload
 
 import numpy as np
@@ -20,7 +21,7 @@ from av.format import Flags
 from av.stream import Disposition
 from av.video.stream import VideoStream
 
-from .packets import PictureTimes, completed
+from .packets import PictureTimes, completed, justified
 
 KNOWN_RATES = tuple(
     Fraction(rate)
@@ -187,8 +188,11 @@ class Timeline:
         return replace(self, times=times, keys=2 * self.keys, stated=stated)
 
 
-def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
-    """Read all packets of a file; the Timeline of one of its streams."""
+def scanned(container: InputContainer, stream: VideoStream, path: Path) -> Timeline:
+    """Read all packets of a file; the Timeline of one of its streams.
+
+    InputError for more packets than a file of its size has.
+    """
     base = stream.time_base or Fraction(1, 90000)
     found = PictureTimes(stream.codec_context.name)
     wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
@@ -196,7 +200,7 @@ def scanned(container: InputContainer, stream: VideoStream) -> Timeline:
     begins: dict[int, int] = {}
     problem = ""
     try:
-        for packet in container.demux(wanted):
+        for packet in justified(container.demux(wanted), path):
             if not packet.size:
                 continue
             if packet.pts is not None:

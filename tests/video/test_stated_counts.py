@@ -1,0 +1,206 @@
+"""Videos that state more than they hold: indices, pictures that grow, openings that take too long.
+
+`soaking.stated` makes every number of every kind of video too large; this has a few of them, and
+what needs more than one number.
+"""
+
+import _thread
+import struct
+import threading
+import time
+import zlib
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+import make_clips as clips
+from soaking import stated
+from soaking.processes import apart
+from soaking.stated import videos
+from wgmb import InputError, allocator, threads
+from wgmb.io import watch
+from wgmb.video.read import container
+from wgmb.video.read.reader import VideoReader
+
+MANY = 80_000_000
+FRAGMENTS = {"movflags": "frag_keyframe+empty_moov"}
+
+
+def box(kind: bytes, *contents: bytes) -> bytes:
+    whole = b"".join(contents)
+    return struct.pack(">I4s", 8 + len(whole), kind) + whole
+
+
+def exchanged(data: bytes, kind: bytes, contents: bytes) -> bytes:
+    """An MP4 in which every box of that kind has other contents."""
+    made, at = b"", 0
+    while at + 8 <= len(data):
+        size, name = struct.unpack_from(">I4s", data, at)
+        if name == kind:
+            made += box(kind, contents)
+        elif name in (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"edts", b"moof", b"traf"):
+            made += box(name, exchanged(data[at + 8 : at + size], kind, contents))
+        else:
+            made += data[at : at + size]
+        at += size
+    return made
+
+
+def index_of(data: bytes) -> tuple[int, int]:
+    """Begin and end of `moov`, which comes last."""
+    return next((begin, end) for name, begin, _, end in videos.boxes(data) if name == "/moov")
+
+
+def compressed(data: bytes, more: int = 0) -> bytes:
+    """An MP4 whose index is compressed, and has so many bytes more."""
+    begin, end = index_of(data)
+    moov = data[begin:end] + bytes(more)
+    packed = struct.pack(">I", len(moov)) + zlib.compress(moov, 9)
+    return data[:begin] + box(b"moov", box(b"cmov", box(b"dcom", b"zlib"), box(b"cmvd", packed)))
+
+
+def renamed(data: bytes, kind: bytes) -> bytes:
+    begin, _ = index_of(data)
+    return data[: begin + 4] + kind + data[begin + 8 :]
+
+
+def edits(data: bytes, count: int) -> bytes:
+    return exchanged(data, b"elst", struct.pack(">II", 0, count) + count * EDIT)
+
+
+EDIT = struct.pack(">Iihh", 500, 0, 1, 0)
+PLAIN = struct.pack(">II", 0, MANY)  # a run of samples that states nothing of each
+HOSTILE = {
+    "samples": lambda mp4, _: videos.with_tables(mp4, MANY, 1),
+    "samples of no bytes": lambda mp4, _: videos.with_tables(mp4, MANY, 0),
+    "what was freed": lambda mp4, _: renamed(videos.with_tables(mp4, MANY, 1), b"free"),
+    "a compressed index": lambda mp4, _: compressed(videos.with_tables(mp4, MANY, 1)),
+    "an index that inflates": lambda mp4, _: compressed(mp4, 100_000_000),
+    "edits": lambda mp4, _: edits(mp4, 1_000_000),
+    "a padded file": lambda mp4, _: videos.with_tables(mp4, 9_000_000, 1) + bytes(9_000_000),
+    "runs of fragments": lambda _, fragments: exchanged(fragments, b"trun", PLAIN),
+    "runs of sizes": lambda _, fragments: exchanged(
+        fragments, b"trun", struct.pack(">II", 0x200, MANY) + bytes(64)
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """Bytes of an MP4, and of one in fragments."""
+    folder = tmp_path_factory.mktemp("sound")
+    return (
+        clips.write(folder / "plain.mp4").read_bytes(),
+        clips.write(folder / "fragments.mp4", muxing=FRAGMENTS).read_bytes(),
+    )
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_an_index_that_the_file_cannot_hold_is_refused_unread(tmp_path, sound, kind, monkeypatch):
+    path = tmp_path / "hostile.mp4"
+    path.write_bytes(HOSTILE[kind](*sound))
+    monkeypatch.setattr(av, "open", lambda *_, **__: pytest.fail("FFmpeg was asked"))
+    with pytest.raises(InputError, match=r"hostile\.mp4: .*(states|index)") as refused:
+        VideoReader(path)
+    assert str(refused.value).count("hostile.mp4") == 1
+
+
+def test_indices_that_the_file_holds_are_read(tmp_path, sound):
+    mp4, fragments = sound
+    for data in (mp4, fragments, compressed(mp4), renamed(mp4, b"moov"), edits(mp4, 5)):
+        path = tmp_path / "sound.mp4"
+        path.write_bytes(data)
+        assert len(VideoReader(path)) >= 12
+    plain = ("pcm_s16le", 48000, np.zeros(480_000))
+    assert len(VideoReader(clips.write(tmp_path / "sound.mov", codec="mjpeg", pixels="yuvj420p",
+                                       sound=plain))) == 12  # fmt: skip
+
+
+def test_any_index_that_takes_too_much_memory_is_refused(tmp_path, sound, monkeypatch):
+    """Also where nothing here knows the form of the file."""
+    monkeypatch.setattr(container, "check_counts", lambda *_: None)
+    path = tmp_path / "hostile.mp4"
+    path.write_bytes(videos.with_tables(sound[0], 3_000_000, 1))
+    with pytest.raises(InputError, match=r"its index takes over 50 MB; `max_mb=800` allows"):
+        VideoReader(path, max_mb=400)
+
+
+def test_an_opening_that_takes_too_long_is_left(monkeypatch):
+    monkeypatch.setattr(watch, "_PATIENCE", 0.2)
+    ended = threading.Event()
+
+    def spin():
+        while not ended.is_set():
+            sum(range(1000))
+
+    with pytest.raises(InputError, match=r"x\.avi: its index takes over 0 s to read"):
+        watch.watched("x.avi", spin, 0, 4096)
+    ended.set()
+    assert watch.watched("x.avi", lambda: 3, 0, 4096) == 3
+    with pytest.raises(ZeroDivisionError):
+        watch.watched("x.avi", lambda: 1 // 0, 0)
+
+
+def test_an_interruption_does_not_wait_for_a_library():
+    ended = threading.Event()
+    threading.Timer(0.2, _thread.interrupt_main).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        threads.apart(lambda: ended.wait(30))
+    ended.set()
+    assert time.monotonic() - began < 10
+
+
+def test_memory_that_is_held_is_measured():
+    before = allocator.held()
+    block = np.ones(100 << 20, np.uint8)
+    assert 90 << 20 < allocator.held() - before < 300 << 20
+    assert block[-1] == 1
+
+
+def test_pictures_that_grow_are_not_decoded(tmp_path):
+    """The header states 64 x 36; the last picture has 1280 x 720, and 7.5 MB are allowed."""
+    path = tmp_path / "grows.webm"
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("libvpx-vp9", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 64, 36, "yuv420p"
+        file.start_encoding()
+        for n, data in enumerate([*packets((64, 36), 3), *packets((1280, 720), 1)]):
+            packet = av.Packet(data)
+            packet.stream, packet.time_base = stream, Fraction(1, 24)
+            packet.pts = packet.dts = n
+            packet.is_keyframe = True
+            file.mux(packet)
+    reader = VideoReader(path, max_mb=30)
+    assert [number for number, _ in reader] == [0, 1, 2]
+    assert "1 of 4 pictures could not be decoded" in reader.loss()
+
+
+def packets(size: tuple[int, int], count: int) -> list[bytes]:
+    context = av.CodecContext.create("libvpx-vp9", "w")
+    context.width, context.height, context.pix_fmt = *size, "yuv420p"
+    context.time_base = Fraction(1, 24)
+    context.options = {"deadline": "realtime", "cpu-used": "8", "lag-in-frames": "0"}
+    frame, found = clips.grey(size), []
+    for n in range(count):
+        frame.pts = n
+        found += context.encode(frame)
+    return [bytes(packet) for packet in [*found, *context.encode(None)]]
+
+
+def test_too_many_packets_are_refused(tmp_path, monkeypatch):
+    path = clips.write(tmp_path / "in.mkv", codec="ffv1")
+    monkeypatch.setattr("wgmb.io.limits._TIMES", 0.1)
+    with pytest.raises(InputError, match=r"in\.mkv: gives \d packets and [\d,]+ bytes already"):
+        VideoReader(path)
+
+
+def test_some_numbers_that_are_too_large_end_with_one_line_or_the_picture(tmp_path):
+    """All of them: `python tools/soak.py --rows stated`."""
+    kinds = ["mp4", "fragments", "matroska"]
+    ended = apart(stated.tried, kinds, 3, str(tmp_path), seconds=120)
+    assert ended.value is not None, ended.err
+    for found in ended.value.values():
+        assert (found["wrong"], found["files"]) == ([], 3)
