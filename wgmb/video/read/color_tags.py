@@ -30,6 +30,9 @@ COLORS = {
 }
 """Matrix, transfer and primaries by the names that a user chooses from."""
 
+_OF_MATRIX = {BT709: BT709, _PAL: _PAL, BT601: BT601, BT2020: BT2020, 10: BT2020}
+_OF_PRIMARIES = {BT709: BT709, _PAL: _PAL, BT601: BT601, BT2020: BT2020}
+
 Tags = tuple[int, int, int, int]
 """Range, matrix, transfer, primaries."""
 
@@ -63,7 +66,8 @@ def assumed(
     """The Coding with these tags, and what had to be assumed, in words.
 
     Untagged pictures are BT.709 if they are 1280 pixels wide or over 576 high, else BT.601; RGB is
-    sRGB. So do players, and so did those who left the tags out.
+    sRGB. So do players, and so did those who left the tags out. Where either the matrix or the
+    primaries are stated, the other is of the same standard.
     """
     range_, matrix, transfer, primaries = tags
     told = [_is_told(tag, which) for which, tag in enumerate(tags)]
@@ -75,18 +79,18 @@ def assumed(
     if of.model == "rgb":
         matrix = 0
     elif matrix == 0 or not told[1]:  # 0 is the matrix of RGB
-        wide = told[3] and primaries == BT2020
-        matrix = BT2020 if wide else BT709 if is_hd else BT601
+        by_size = BT709 if is_hd else BT601
+        matrix = _OF_PRIMARIES.get(primaries, by_size) if told[3] else by_size
         if of.model == "yuv":
             said.append(f"matrix {_name(matrix)}")
     if not told[2]:
         transfer = SRGB if of.model == "rgb" else BT709
         said.append("transfer sRGB" if transfer == SRGB else "transfer BT.709")
     if not told[3]:
-        wide = matrix == BT2020
         small = _PAL if size[1] == 576 else BT601
-        is_hd |= of.model == "rgb"
-        primaries = BT2020 if wide else BT709 if is_hd else small
+        primaries = BT709 if is_hd or of.model == "rgb" else small
+        if matrix == BT2020 or told[1]:
+            primaries = _OF_MATRIX.get(matrix, primaries)
         said.append(f"primaries {_name(primaries)}")
     coding = Coding(of.model, of.bits, of.steps, of.alpha, full, matrix, transfer, primaries)
     return coding, tuple(said)

@@ -40,6 +40,7 @@ from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
 from .side_data import SideData, light_level_of, mastering_of, side_data_of
+from .stream_text import StreamText, cropped, stream_texts, whole_samples
 from .timeline import Times, scanned
 
 PRIMING = Fraction(-1, 10)  # seconds before 0, in which decoders of sound begin
@@ -90,7 +91,13 @@ class VideoReader:
             self.container = container.format.name
             self.codec = stream.codec_context.codec.canonical_name  # not that of the decoder
             self.chapters = len(container.chapters())
-            self.streams = tuple(_described(s) for s in container.streams if s is not stream)
+            texts = stream_texts(container)
+            self._crop = texts.get(stream.index, StreamText()).crop
+            self.streams = tuple(
+                _described(s, texts.get(s.index, StreamText()).kind)
+                for s in container.streams
+                if s is not stream
+            )
             self._tagged = tags_of(stream.codec_context)
             self._field_order = stream.codec_context.field_order
             self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
@@ -147,6 +154,7 @@ class VideoReader:
             raise InputError(f"{self.path}: pixels of kind {self.pixels} are not supported")
         self._layout: PlaneLayout = found
         self._frame_size = frame.width, frame.height
+        self._crop = whole_samples(self._crop, self._frame_size, found.steps)
         side = side_data_of(frame)
         self._turn = rotation_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
         self.mastering, self.light_level = mastering_of(side), light_level_of(side)
@@ -262,7 +270,8 @@ class VideoReader:
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of upright pictures [px]."""
-        width, height = self._frame_size
+        left, right, top, bottom = self._crop
+        width, height = self._frame_size[0] - left - right, self._frame_size[1] - top - bottom
         return (height, width) if self._turn.swaps else (width, height)
 
     @property
@@ -338,6 +347,7 @@ class VideoReader:
             expected = number + 1
             self._is_at_end |= expected == len(self)
             planes = planes_of(self._fitted(frame, number, by), self._layout, by)
+            planes = cropped(planes, self._crop, self._layout.steps)
             yield number, CodedPicture(tuple(map(self._turn, planes)), self.coding)
             if number == last:
                 break
@@ -366,9 +376,9 @@ class VideoReader:
         yield from fields.of(None)
 
 
-def _described(stream: Stream) -> OtherStream:
+def _described(stream: Stream, kind: str) -> OtherStream:
     context = stream.codec_context
-    codec = context.name if context is not None else "unknown"
+    codec = context.name if context is not None else kind or "unknown"
     text = codec
     if isinstance(stream, AudioStream) and context is not None:
         text += f", {stream.rate} Hz, {stream.layout.name}"

@@ -30,6 +30,7 @@ from .container import (
 )
 from .rotation import rotation_of
 from .side_data import light_level_of, mastering_of, side_data_of
+from .stream_text import StreamText, cropped, stream_texts, whole_samples
 from .timeline import known_rate
 
 _JITTER = Fraction(1, 4)  # of an interval
@@ -89,7 +90,10 @@ class StreamReader:
         coding, said = assumed(found, (first.width, first.height), context.name, tags)
         turned = coding.steps[::-1] if self._turn.swaps else coding.steps
         self.coding = replace(coding, steps=turned)
-        across, down = first.width, first.height
+        texts, size = stream_texts(self._container), (first.width, first.height)
+        crop = texts.get(self._stream.index, StreamText()).crop
+        self._crop = left, right, top, bottom = whole_samples(crop, size, found.steps)
+        across, down = first.width - left - right, first.height - top - bottom
         self.size = (down, across) if self._turn.swaps else (across, down)
         self.rate = known_rate(self._stream.average_rate) or self._stream.guessed_rate
         """Pictures a second, as stated or found at the beginning; None if it is not known."""
@@ -134,6 +138,7 @@ class StreamReader:
                     f"the first one {self._first.width} x {self._first.height}"
                 )
             planes = planes_of(frame, self._layout, self._by)
+            planes = cropped(planes, self._crop, self._layout.steps)
             yield number, CodedPicture(tuple(map(self._turn, planes)), self.coding)
             following = next(self._frames, None)
             number += self._steps(frame, following, number)

@@ -21,12 +21,15 @@ from av.container import OutputContainer
 from av.error import FFmpegError
 from av.packet import Packet
 from av.stream import Discard, Disposition, Stream
+from av.video.stream import VideoStream
 
 from ..clock import AS_IT_IS, Clock
 from ..read.container import opened
 from ..read.reader import PRIMING
+from ..read.stream_text import stream_texts
 from .audio import SoundAtSpeed, encoder
 from .encoders import CONTAINERS
+from .time_code import moved
 
 if TYPE_CHECKING:
     from av.container.core import Chapter
@@ -36,7 +39,9 @@ _AFTER = 5  # seconds after it, at which reading ends
 _OF_THE_FILE = (  # texts that say what another file holds
     "DURATION", "BPS", "NUMBER_OF_", "_STATISTICS", "HANDLER_NAME", "VENDOR_ID", "ENCODER",
 )  # fmt: skip
-_OWN = ("language", "title", "creation_time")  # texts of a stream of pictures
+_OWN = ("language", "title", "creation_time", "stereo_mode")  # texts of a stream of pictures
+_TIME_CODE = "time code"
+_WITH_CODE = ("mov", "mp4", "matroska")
 
 
 class OtherStreams:
@@ -55,7 +60,9 @@ class OtherStreams:
         self._ways: dict[int, _Copied | SoundAtSpeed] = {}
         self._packets: Iterator[Packet[Any]] = iter(())
         self._next: Packet[Any] | None = None
-        self._texts = dict(self._container.metadata)
+        texts = self._container.metadata
+        self._texts = {key: text for key, text in texts.items() if key.lower() != "timecode"}
+        self._kinds = {n: text.kind for n, text in stream_texts(self._container).items()}
 
     @property
     def metadata(self) -> dict[str, str]:
@@ -68,15 +75,15 @@ class OtherStreams:
         unknown: list[int] = []
         for stream in self._container.streams:
             if stream.index == self._pictures:
-                texts = stream.metadata
-                to.streams.video[0].metadata.update({k: texts[k] for k in _OWN if k in texts})
+                said += self._describe_pictures(cast(VideoStream, stream), to)
                 stream.discard = Discard.all  # it is read elsewhere
                 continue
             if self._is_of_chapters(stream):
                 stream.discard = Discard.all
                 continue
             if stream.type == "data" and stream.codec_context is None:
-                unknown.append(stream.index)
+                if self._kinds.get(stream.index) != _TIME_CODE:  # a text of the pictures
+                    unknown.append(stream.index)
                 stream.discard = Discard.all
                 continue
             why = self._why_not(stream) or self._add(stream, to)
@@ -84,7 +91,7 @@ class OtherStreams:
                 stream.discard = Discard.all
                 said.append(f"{_named(stream)} is left out: {why}")
         if unknown:
-            said.append(_of_no_known_kind(unknown))
+            said.append(_left_out(unknown, self._kinds))
         chapters = list(_moved(self._container.chapters(), self._clock))
         if chapters and to.format.name == "gif":
             said.append(f"{len(chapters)} chapters are left out: a GIF holds none")
@@ -99,7 +106,28 @@ class OtherStreams:
 
     def _is_of_chapters(self, stream: Stream) -> bool:
         """Return True for the track in which MP4 and MOV keep chapters."""
-        return stream.type == "data" and 0 < stream.frames == len(self._container.chapters())
+        chapters = len(self._container.chapters())
+        is_text = self._kinds.get(stream.index) == "text"
+        return stream.type == "data" and chapters > 0 and (is_text or stream.frames == chapters)
+
+    def _describe_pictures(self, stream: VideoStream, to: OutputContainer) -> list[str]:
+        """Give the new pictures the texts of the old ones; return what is left out, in words."""
+        into = to.streams.video[0]
+        texts = {key.lower(): text for key, text in stream.metadata.items()}
+        into.metadata.update({key: texts[key] for key in _OWN if key in texts})
+        whole = {key.lower(): text for key, text in self._container.metadata.items()}
+        code = texts.get("timecode") or whole.get("timecode", "")
+        if not code:
+            return []
+        begin = (stream.start_time or 0) * (stream.time_base or Fraction(0))
+        by = (self._clock.first or begin) - begin
+        rate, to_rate, kind = stream.average_rate, into.average_rate, to.format.name
+        if kind == "matroska":  # there it is a text; elsewhere FFmpeg needs the rate
+            to_rate = to_rate or 1 / (into.time_base or Fraction(1))
+        if rate and to_rate and self._clock.speed == 1 and kind in _WITH_CODE:
+            into.metadata["timecode"] = moved(code, rate, max(by, Fraction(0)), to_rate)
+            return []
+        return [f"its time code ({code}) is not kept"]
 
     def _why_not(self, stream: Stream) -> str:
         """The reason why a stream cannot be copied, or ''."""
@@ -290,11 +318,15 @@ def _named(stream: Stream) -> str:
     return text + (f", {language})" if language != "und" else ")")
 
 
-def _of_no_known_kind(indices: list[int]) -> str:
-    """That streams are left out of which nothing is known, in words; phones write several."""
-    several = len(indices) > 1
-    numbers = f"streams {', '.join(map(str, indices))}" if several else f"stream {indices[0]}"
-    return f"{numbers} (data of unknown kind) {'are' if several else 'is'} left out"
+def _left_out(numbers: list[int], kinds: dict[int, str]) -> str:
+    """That streams of data are left out, in words; phones and cameras write several."""
+    named = {number: kinds.get(number) or "data of unknown kind" for number in numbers}
+    together = ", ".join(
+        f"{', '.join(str(n) for n in named if named[n] == kind)} ({kind})"
+        for kind in dict.fromkeys(named.values())
+    )
+    several = len(numbers) > 1
+    return f"stream{'s' if several else ''} {together} {'are' if several else 'is'} left out"
 
 
 def _moved(chapters: list[Chapter], clock: Clock) -> Iterator[Chapter]:

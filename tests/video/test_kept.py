@@ -1,0 +1,166 @@
+"""Facts about a video that are no streams: crop, time code, names of data, views and colours."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+import make_clips as clips
+from wgmb import blur_video
+from wgmb.video.read.reader import VideoReader
+from wgmb.video.read.stream_text import _read, cropped, whole_samples
+from wgmb.video.write.time_code import moved
+
+
+def inserted(data: bytes, path: list[int], element: bytes) -> bytes:
+    """A Matroska file without lengths of segment and clusters, with one more element in a path."""
+    at = 0
+    while at < len(data):
+        length = (lambda first: 9 - first.bit_length())(data[at])
+        number, at_size = int.from_bytes(data[at : at + length]), at + length
+        wide = 9 - data[at_size].bit_length()
+        size = int.from_bytes(data[at_size : at_size + wide]) & ((1 << 7 * wide) - 1)
+        begin, unknown = at_size + wide, size == (1 << 7 * wide) - 1
+        end = len(data) if unknown else begin + size
+        if number == path[0]:
+            inner = data[begin:end]
+            inner = element + inner if len(path) == 1 else inserted(inner, path[1:], element)
+            head = data[at_size:begin] if unknown else (len(inner) | 1 << 56).to_bytes(8)
+            return data[:at_size] + head + inner + data[end:]
+        at = end
+    raise ValueError("no such element")
+
+
+VIDEO = [0x18538067, 0x1654AE6B, 0xAE, 0xE0]
+
+
+def matroska(path, *elements, size=(64, 48), **more):
+    """A clip whose video has these elements, each a number of two bytes and its content."""
+    frames = [clips.frame(clips.planes(n, size), "yuv420p") for n in range(8)]
+    clips.write(path, frames, muxing={"live": "1"}, **more)
+    data = path.read_bytes()
+    for number, content in elements:
+        data = inserted(data, VIDEO, number.to_bytes(2) + bytes([0x80 | len(content)]) + content)
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.fast
+def test_a_crop_of_matroska_is_cut_off(tmp_path):
+    """Left 4, right 6, top 3, bottom 2: chroma is whole, so that a row more is kept at the top."""
+    parts = [(0x54CC, 4), (0x54DD, 6), (0x54BB, 3), (0x54AA, 2)]
+    path = matroska(tmp_path / "a.mkv", *((n, bytes([v])) for n, v in parts))
+    reader = VideoReader(path)
+    assert reader.size == (54, 44)
+    whole = dict(VideoReader(matroska(tmp_path / "b.mkv")))
+    for number, picture in reader:
+        luma, *chroma = picture.planes
+        np.testing.assert_array_equal(luma, whole[number].planes[0][2:46, 4:58])
+        for plane, full in zip(chroma, whole[number].planes[1:], strict=True):
+            np.testing.assert_array_equal(plane, full[1:23, 2:29])
+
+
+@pytest.mark.fast
+def test_a_crop_of_all_is_none():
+    assert whole_samples((30, 34, 0, 0), (64, 48), (2, 2)) == (0, 0, 0, 0)
+    planes = (np.zeros((5, 7)), np.zeros((3, 4)), np.zeros((3, 4)))
+    assert [p.shape for p in cropped(planes, (2, 1, 0, 1), (2, 2))] == [(4, 4), (2, 2), (2, 2)]
+
+
+def test_a_cropped_video_is_written_without_its_bars(tmp_path):
+    path = matroska(tmp_path / "a.mkv", (0x54BB, b"\x08"), (0x54AA, b"\x08"))
+    blur_video(path, tmp_path / "b.mp4", flow="none")
+    assert VideoReader(tmp_path / "b.mp4").size == (64, 32)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("tags", "want"),
+    [((1, 1, 2, 2), (1, 1)), ((1, 6, 2, 2), (6, 6)), ((1, 5, 2, 2), (5, 5)),
+     ((1, 9, 2, 2), (9, 9)), ((1, 2, 2, 1), (1, 1)), ((1, 2, 2, 9), (9, 9)),
+     ((1, 2, 2, 2), (6, 6)), ((1, 1, 2, 12), (1, 12))],
+)  # fmt: skip
+def test_matrix_and_primaries_are_of_one_standard(tmp_path, tags, want):
+    """Range, matrix, transfer, primaries; 2 is unspecified."""
+    coding = VideoReader(clips.write(tmp_path / "a.mp4", tags=tags)).coding
+    assert (coding.matrix, coding.primaries) == want
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("code", "rate", "by", "to", "want"),
+    [("01:02:03:04", 24, 0, 24, "01:02:03:04"), ("01:02:03:23", 24, "1/24", 24, "01:02:04:00"),
+     ("01:02:03:04", 24, "1/4", 48, "01:02:03:20"), ("23:59:59:24", 25, "1/25", 25, "00:00:00:00"),
+     ("01:00:59;29", "30000/1001", "1001/30000", "30000/1001", "01:01:00;02"),
+     ("00:59:59;29", "30000/1001", "1001/30000", "30000/1001", "01:00:00;00"),
+     ("01:00:59;29", "30000/1001", 0, "60000/1001", "01:00:59;58"),
+     ("01:00:00;00", "30000/1001", 0, 24, "01:00:00:00"), ("noon", 24, 0, 24, "")],
+)  # fmt: skip
+def test_time_codes_go_on(code, rate, by, to, want):
+    assert moved(code, Fraction(rate), Fraction(by), Fraction(to)) == want
+
+
+def coded(path, codec="libx264", tick=clips.TICK):
+    def add(container):
+        container.streams.video[0].metadata["timecode"] = "01:02:03:04"
+
+    return clips.write(path, before=add, codec=codec, tick=tick)
+
+
+def time_code(path) -> str:
+    with av.open(str(path)) as container:
+        texts = {k.lower(): v for k, v in container.streams.video[0].metadata.items()}
+    return texts.get("timecode", "")
+
+
+@pytest.mark.parametrize("to", ["mov", "mp4", "mkv", "webm"])
+@pytest.mark.parametrize("kind", ["mov", "mkv", "mxf"])
+def test_a_time_code_comes_along(tmp_path, kind, to):
+    codec, tick = ("mpeg2video", Fraction(1, 24)) if kind == "mxf" else ("libx264", clips.TICK)
+    source, path = coded(tmp_path / f"a.{kind}", codec, tick), tmp_path / f"b.{to}"
+    report = blur_video(source, path, flow="none", begin=0.25, fps=48)
+    is_said = "its time code (01:02:03:04) is not kept" in report.left_out
+    assert is_said == (to == "webm")
+    assert time_code(path) == ("" if to == "webm" else "01:02:03:20")
+    assert not any("data" in line or "time code)" in line for line in report.left_out)
+
+
+def test_a_time_code_is_kept_with_segments_or_said_and_not_at_another_speed(tmp_path):
+    source, said = coded(tmp_path / "a.mov"), "its time code (01:02:03:04) is not kept"
+    report = blur_video(source, tmp_path / "b.mkv", flow="none", resume=True)
+    assert time_code(tmp_path / "b.mkv") == "01:02:03:04" and not report.left_out
+    report = blur_video(source, tmp_path / "b.mov", flow="none", resume=True)
+    assert time_code(tmp_path / "b.mov") == "" and said in report.left_out
+    report = blur_video(source, tmp_path / "c.mov", flow="none", speed=0.5)
+    assert said in report.left_out
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("line", "want"),
+    [("Data: bin_data (gpmd / 0x646D7067), 29 kb/s", "telemetry of GoPro"),
+     ("Data: none (tmcd / 0x64636D74), 0 kb/s", "time code"),
+     ("Data: klv (KLVA / 0x41564C4B)", "telemetry (KLV)"),
+     ("Data: none (abcd / 0x64636261)", "abcd"),
+     ("Data: bin_data (text / 0x74786574)", "text"), ("Data: none", "")],
+)  # fmt: skip
+def test_data_has_a_name(line, want):
+    assert _read(f"[0x3](eng): {line}\n  Metadata: 1").kind == want
+
+
+def test_streams_of_data_are_named(tmp_path, capsys):
+    def add(container):
+        container.add_data_stream("klv")
+
+    def after(container):
+        packet = av.Packet(b"\x06\x0e+4" + bytes(16))
+        packet.stream, packet.time_base = container.streams[1], Fraction(1, 1000)
+        packet.pts = packet.dts = 0
+        container.mux(packet)
+
+    source = clips.write(tmp_path / "a.ts", before=add, also=after)
+    (data,) = VideoReader(source).streams
+    assert (data.kind, data.text) == ("data", "telemetry (KLV)")
+    report = blur_video(source, tmp_path / "b.mp4", flow="none")
+    assert report.left_out == ["stream 1 (telemetry (KLV)) is left out"]
