@@ -9,6 +9,7 @@ times.
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -20,8 +21,10 @@ from numpy.typing import NDArray
 
 from . import charts
 from .errors import InputError, check_choice
+from .files import bounded
 
 Weight = Callable[[np.ndarray], np.ndarray]
+_MOST_BYTES = 16 << 20  # of a curve's file
 
 
 def _box(x: np.ndarray) -> np.ndarray:
@@ -191,6 +194,11 @@ def _stretch(curve: Weight, first: float, last: float, x: np.ndarray) -> np.ndar
     return curve(np.clip(first + (last - first) * x, 0, 1))
 
 
+def curve_bytes(path: str | Path) -> bytes:
+    """The bytes of a curve's file; InputError if it is too large, or no regular file."""
+    return bounded.read(Path(path), _MOST_BYTES, "a curve")
+
+
 def read_curve(path: str | Path) -> Weight:
     """A curve from a CSV file of `time, weight` rows, a header line allowed.
 
@@ -198,8 +206,8 @@ def read_curve(path: str | Path) -> Weight:
     duration is given by the shutter's degrees. Linear between the rows.
     """
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+        text = io.StringIO(curve_bytes(path).decode(), newline="")
+        rows = [row for row in csv.reader(text) if row and not row[0].startswith("#")]
     except OSError as error:
         raise InputError(f"curve {path}: {(error.strerror or str(error)).lower()}") from None
     except (UnicodeDecodeError, csv.Error) as error:

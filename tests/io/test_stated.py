@@ -2,7 +2,6 @@
 
 import io
 import lzma
-import os
 import struct
 import tracemalloc
 import zlib
@@ -13,7 +12,7 @@ import tifffile
 from PIL import Image
 
 from wgmb import InputError
-from wgmb.io import limits, stills
+from wgmb.io import stills
 
 pytestmark = pytest.mark.fast
 
@@ -179,16 +178,3 @@ def test_jpegs_with_profiles_and_texts_are_read_as_without(tmp_path):
         shown.save(stream, "jpeg", quality=90, restart_marker_rows=1, **options)
         (tmp_path / name).write_bytes(stream.getvalue())
     assert np.array_equal(stills.read(tmp_path / "a.jpg"), stills.read(tmp_path / "b.jpg"))
-
-
-@pytest.mark.parametrize("what", ["pipe", "device", "folder", "link"])
-def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, what):
-    path = tmp_path / "a.json"
-    if what == "pipe":
-        os.mkfifo(path)
-    elif what == "folder":
-        path.mkdir()
-    else:
-        path.symlink_to("/dev/zero")
-    with pytest.raises(InputError if what != "folder" else OSError, match=r"a\.json"):
-        limits.whole(path, 100, "a camera file")

@@ -17,7 +17,7 @@ PACKAGE, SHADERS = ROOT / "wgmb", ROOT / "wgsl"
 # A folder, or a module beside it, imports only from the lines above its own, and from itself.
 LAYERS = [
     {"_version", "errors", "threads", "allocator", "requirements", "interpreter"},
-    {"extras", "charts", "gpu"},
+    {"extras", "charts", "gpu", "files"},
     {"color", "shutter", "camera"},
     {"png", "exposure", "cone", "metrics"},
     {"frame"},

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, did_you_mean
-from . import ocio
+from . import config_files, ocio
 from .primaries import (
     AP0,
     AP1,
@@ -87,9 +87,10 @@ class ColorConfig:
 
     def __init__(self, config: str | Path):
         self._ocio, place = ocio.load(), ocio.config_file(str(config))
-        _check_text(str(config), Path(place))
+        config_files.check(str(config), Path(place))
         with ocio.reported(str(config)):
             self._config: Any = self._ocio.Config.CreateFromFile(place)
+            config_files.check_tables(self._ocio, self._config)
         self.name: str = self._config.getName() or Path(place).name
         """For messages and records."""
         self.version: str = self._config.getCacheID().partition(":")[0]
@@ -348,17 +349,6 @@ class Display:
             return samples
         covered = np.rint(np.clip(rgba[..., 3:], 0, 1).astype(np.float32) * most).astype(kind)
         return np.concatenate([samples, covered], axis=2)
-
-
-def _check_text(config: str, path: Path) -> None:
-    """InputError for a file whose names could not be read; archives hold none of that kind."""
-    if path.suffix == ".ocio" and path.is_file():
-        try:
-            path.read_text("utf-8")
-        except UnicodeDecodeError as error:
-            raise InputError(
-                f"{config}: must be text in UTF-8, byte {error.start} is not"
-            ) from None
 
 
 def _same(name: str, known: list[str]) -> str | None:

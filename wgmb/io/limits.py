@@ -2,13 +2,12 @@
 
 Sizes, counts and offsets that a file states are compared with its length before a library acts on
 them; compressed data inflate to no more than their picture takes; and files that are read whole
-are regular ones of a bounded size. A file that cannot be judged is refused in one line.
+are regular ones of a bounded size (`files/bounded.py`). A file that cannot be judged is refused in
+one line.
 """
 
 from __future__ import annotations
 
-import os
-import stat
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
@@ -79,26 +78,6 @@ def inflated(pieces: Iterable[bytes | memoryview], size: int, name: str) -> byte
     if not stream.eof:
         raise ValueError(f"{name} is cut off")
     return b"".join(found)
-
-
-def whole(path: Path, most: int, kind: str) -> bytes:
-    """The bytes of a regular file of at most `most` bytes, such as a camera file.
-
-    A FIFO, a device and a link to one are refused without being read. `kind`: of the file, for
-    the message. InputError names the file; OSError where the system refuses it.
-    """
-    with open(path, "rb", opener=_without_waiting) as file:
-        is_regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-        data = file.read(most + 1) if is_regular else b""
-    if not is_regular:
-        raise InputError(f"{path}: must be a regular file, is a pipe, a device or a folder")
-    if len(data) > most:
-        raise InputError(f"{path}: over {most >> 20} MiB, too large for {kind}")
-    return data
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def check_limit(max_mb: float) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 
 from .._version import __version__
 from ..errors import InputError
+from ..files import bounded
 from ..io import atomic
 from ..io.frame_numbers import is_pattern, readable
 from ..io.suffixes import VIDEOS
@@ -118,10 +119,8 @@ def read_job(path: Path) -> Stored:
     """The job in a file; InputError in one line if it is none, damaged, or of another wgmb."""
     if not readable(path):
         raise InputError(f"{path}: no such file")
-    if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a job")
     try:
-        text = path.read_bytes().decode()
+        text = bounded.read(path, _MOST_BYTES, "a job").decode()
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a job written by wgmb") from None
     return of_text(text, str(path))

@@ -12,6 +12,7 @@ from ..shutter import (
     CURVES,
     PHASES,
     Shutter,
+    curve_bytes,
     read_curve,
 )
 from .record import plain
@@ -48,7 +49,7 @@ class ShutterSettings:
         """Return the curve's name, and for a file its checksum, as its contents may change."""
         if self.curve is None or self.curve in CURVES:
             return self.curve
-        return f"{self.curve} (CRC-32 {zlib.crc32(Path(self.curve).read_bytes()):08x})"
+        return f"{self.curve} (CRC-32 {zlib.crc32(curve_bytes(self.curve)):08x})"
 
     @property
     def looks(self) -> dict[str, Any]:

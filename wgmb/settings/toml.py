@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..files import bounded
 from ..io.frame_numbers import readable
 
 _MOST_BYTES = 1 << 20
@@ -16,10 +17,8 @@ def text_of(path: Path) -> str:
     """The text of a settings file; InputError names it and says why it cannot be read."""
     if not readable(path):
         raise InputError(f"{path}: no such file")
-    if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for settings")
     try:
-        return path.read_bytes().decode()
+        return bounded.read(path, _MOST_BYTES, "settings").decode()
     except UnicodeDecodeError:
         raise InputError(f"{path}: settings must be UTF-8") from None
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..extras import needed_by
+from ..files import bounded
 from ..io.frame_numbers import frame_numbers, readable
 
 _ONLY, _NONE = "only:", "none"
@@ -79,10 +80,8 @@ class CutList:
         path, fps = Path(found["path"]), _rate(found["fps"], self._plain)
         if not readable(path):
             raise InputError(f"{path}: no such file")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for an edit")
         read = _read_edl if found["kind"].lower() == "edl" else _read_otio
-        edges = read(path, fps)
+        edges = read(path, bounded.read(path, _MOST_BYTES, "an edit"), fps)
         begin, end = min(edges), max(edges)
         return frozenset(first + edge - begin for edge in edges - {begin, end})
 
@@ -100,11 +99,11 @@ def _rate(text: str | None, whole: str) -> float | None:
     return fps
 
 
-def _read_edl(path: Path, fps: float | None) -> set[int]:
+def _read_edl(path: Path, data: bytes, fps: float | None) -> set[int]:
     """Begins and ends of the events of an edit decision list (CMX 3600), in frames."""
     nominal = round(fps or _FPS)  # timecode counts whole frames
     edges: set[int] = set()
-    for line in path.read_bytes().decode("utf-8-sig", "replace").splitlines():
+    for line in data.decode("utf-8-sig", "replace").splitlines():
         if re.match(r"\s*FCM:\s*DROP", line, re.IGNORECASE):
             raise _dropped(path)
         event = _EVENT.fullmatch(line.strip())
@@ -137,9 +136,9 @@ def _dropped(path: Path) -> InputError:
     return InputError(f"{path}: drop frame timecode is not supported; export it as non-drop frame")
 
 
-def _read_otio(path: Path, fps: float | None) -> set[int]:
+def _read_otio(path: Path, data: bytes, fps: float | None) -> set[int]:
     """Begins and ends of the clips on all video tracks of a timeline, in frames."""
-    text = path.read_bytes().decode("utf-8", "replace")
+    text = data.decode("utf-8", "replace")
     if _depth(text) > _DEEPEST:  # the library would crash
         raise InputError(f"{path}: lists are nested over {_DEEPEST} deep, too deep for an edit")
     with needed_by(str(path)):

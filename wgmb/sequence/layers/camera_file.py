@@ -11,6 +11,7 @@ import numpy as np
 
 from ...camera import MAX_INDEX, Camera, Reprojections
 from ...errors import InputError
+from ...files import bounded
 
 _MOST_BYTES = 256 << 20
 
@@ -97,9 +98,7 @@ def _read_json(path: Path) -> dict[float, dict[str, Any]]:
     try:
         if not path.is_file():
             raise InputError(f"{path}: no such file")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a camera file")
-        content = json.loads(path.read_bytes())
+        content = json.loads(bounded.read(path, _MOST_BYTES, "a camera file"))
         frames = content["frames"]
         numbered = {float(k): v for k, v in frames.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

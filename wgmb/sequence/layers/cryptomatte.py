@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, did_you_mean
+from ...files import bounded
 from .names import layers, stem
 
 Attributes = Mapping[str, str]
@@ -125,9 +126,7 @@ def _manifest(crypto: Attributes, folders: Iterable[Path]) -> tuple[dict[str, ob
     try:
         if not path.is_file():
             raise InputError(f"{path}: no such file; it is the manifest of {crypto['name']!r}")
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{path}: over {_MOST_BYTES >> 20} MiB, too large for a manifest")
-        manifest = _parsed(path.read_text("utf-8"))
+        manifest = _parsed(bounded.read(path, _MOST_BYTES, "a manifest").decode())
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8") from None
     except OSError as error:

@@ -1,0 +1,1 @@
+"""Files of strangers that are read whole."""
