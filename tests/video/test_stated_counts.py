@@ -204,3 +204,23 @@ def test_some_numbers_that_are_too_large_end_with_one_line_or_the_picture(tmp_pa
     assert ended.value is not None, ended.err
     for found in ended.value.values():
         assert (found["wrong"], found["files"]) == ([], 3)
+
+
+def test_a_reading_that_is_left_closes_its_file_itself(tmp_path, monkeypatch):
+    """FFmpeg must not close a file while another thread reads it."""
+    path, readers, ended = clips.write(tmp_path / "in.mkv", codec="ffv1"), [], threading.Event()
+
+    def slow(container, *_):
+        readers.append(container)
+        ended.wait(30)
+        readers.append([packet.size for packet in container.demux() if packet.size])
+
+    monkeypatch.setattr("wgmb.video.read.reader.scanned", slow)
+    threading.Timer(0.5, _thread.interrupt_main).start()
+    with pytest.raises(KeyboardInterrupt):
+        VideoReader(path)
+    ended.set()
+    until = time.monotonic() + 30
+    while len(readers) < 2 and time.monotonic() < until:
+        time.sleep(0.01)
+    assert len(readers[1]) == 12

@@ -45,11 +45,7 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
     index may take an eighth of `max_mb` megabytes (see limits.py), unless the file `is_known` from
     an opening before. Larger pictures than that allows are not decoded. Ctrl-C does not wait.
     """
-    if not readable(path):
-        raise InputError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
-    if not path.stat().st_size:
-        raise InputError(f"{path}: is empty")
-    stored = path.stat().st_size
+    stored = size_of(path)
 
     def work() -> InputContainer:
         if not is_known:
@@ -72,6 +68,15 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
         return watch.watched(path, work, stored, math.inf if is_known else max_mb)
     except (FFmpegError, OSError, UnicodeError) as error:
         raise InputError(f"{path}: {_what_is_wrong(path, error)}") from None
+
+
+def size_of(path: Path) -> int:
+    """The length of a file in bytes; InputError in one line where there is nothing to read."""
+    if not readable(path):
+        raise InputError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
+    if not (stored := path.stat().st_size):
+        raise InputError(f"{path}: is empty")
+    return stored
 
 
 def largest_picture(stored: int, max_mb: float) -> dict[str, str]:

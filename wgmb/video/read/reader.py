@@ -35,7 +35,7 @@ from ..pixels import (
 )
 from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
-from .container import HELD_CHANNELS, opened, picture_stream
+from .container import HELD_CHANNELS, opened, picture_stream, size_of
 from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
@@ -84,10 +84,28 @@ class VideoReader:
         self.scaled: set[int] = set()
         self._is_at_end = False
         self.notes: list[str] = []
-        with opened(self.path, max_mb) as container:
+        self._max_mb = max_mb
+        watch.watched(self.path, self._read_packets, size_of(self.path), max_mb, _PACE)
+        if not len(self._packets.times):
+            raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
+        if self._packets.goes_back is not None:
+            number, before, after = self._packets.goes_back
+            raise InputError(
+                f"{self.path}: its clock goes back before picture {number}, from "
+                f"{float(before):.2f} to {float(after):.2f} s; `ffmpeg -i IN -c copy OUT.mkv` "
+                "puts its parts one after the other"
+            )
+        apart(self._probe)
+
+    def _read_packets(self) -> None:
+        """Read what the file says of itself, and the times of its packets.
+
+        The thread that opens the file also closes it: it may be left while FFmpeg reads.
+        """
+        with opened(self.path, self._max_mb) as container:
             stream = picture_stream(container, self.path)
             self.index = stream.index
-            self._check_size(stream, max_mb)
+            self._check_size(stream)
             self.container = container.format.name
             self.codec = stream.codec_context.codec.canonical_name  # not that of the decoder
             self.chapters = len(container.chapters())
@@ -103,23 +121,9 @@ class VideoReader:
             self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
             if stream.metadata.get("alpha_mode") == "1":
                 self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
-            stored = self.path.stat().st_size
-            self._packets = watch.watched(
-                self.path, lambda: scanned(container, stream, self.path), stored, max_mb, _PACE
-            )
-        if not len(self._packets.times):
-            raise InputError(f"{self.path}: {self._packets.problem or 'holds no pictures'}")
-        if self._packets.goes_back is not None:
-            number, before, after = self._packets.goes_back
-            raise InputError(
-                f"{self.path}: its clock goes back before picture {number}, from "
-                f"{float(before):.2f} to {float(after):.2f} s; `ffmpeg -i IN -c copy OUT.mkv` "
-                "puts its parts one after the other"
-            )
-        self._max_mb = max_mb
-        apart(self._probe)
+            self._packets = scanned(container, stream, self.path)
 
-    def _check_size(self, stream: VideoStream, max_mb: float) -> None:
+    def _check_size(self, stream: VideoStream) -> None:
         width, height = stream.codec_context.width, stream.codec_context.height
         if not (width and height) and stream.codec_context.name == "webp":
             raise InputError(f"{self.path}: animated WebP is not read; GIF, APNG and AVIF are")
@@ -132,7 +136,7 @@ class VideoReader:
             )
         promised = limits.unpacked((width, height), HELD_CHANNELS)
         stored = self.path.stat().st_size
-        limits.check(self.path, f"{width} x {height}", promised, stored, max_mb)
+        limits.check(self.path, f"{width} x {height}", promised, stored, self._max_mb)
 
     def _probe(self) -> None:
         """Decode one picture: what it says of itself counts more than what the header says."""

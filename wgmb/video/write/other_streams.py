@@ -56,7 +56,7 @@ class OtherStreams:
     ):
         self._path, self._pictures, self._clock = path, pictures, clock
         self._keeps_pitch = keeps_pitch
-        self._container = opened(path)
+        self._container = opened(path, is_known=True)
         self._ways: dict[int, _Copied | SoundAtSpeed] = {}
         self._packets: Iterator[Packet[Any]] = iter(())
         self._next: Packet[Any] | None = None
@@ -284,7 +284,7 @@ def sounds_in(path: Path, suffix: str, *, is_encoded: bool) -> list[int]:
     `is_encoded`: sound is encoded again, as at another speed.
     """
     kind = CONTAINERS[suffix]
-    with opened(path) as container:
+    with opened(path, is_known=True) as container:
         streams = [s for s in container.streams.audio if s.codec_context is not None]
         return [s.index for s in streams if not _refusal(s, kind, is_encoded)]
 

@@ -114,7 +114,7 @@ class Segments:
         into: VideoStream | None = None
         for index, order in enumerate(orders):
             path = self._file(index)
-            with opened(path) as container:
+            with opened(path, is_known=True) as container:
                 stream = picture_stream(container, path)
                 if into is None:
                     into = file.container.add_stream_from_template(stream, opaque=True)
@@ -146,7 +146,7 @@ class Segments:
 
         The container may have rounded their times. InputError unless each is there once.
         """
-        with opened(path) as container:
+        with opened(path, is_known=True) as container:
             stream = picture_stream(container, path)
             base = stream.time_base or self._format.base
             shown = [p.pts for p in container.demux(stream) if p.size and p.pts is not None]
