@@ -84,7 +84,7 @@ def test_a_help_offers_only_methods_that_can_work(said, command):
 @pytest.mark.parametrize(
     "text, said",
     [("[blur]\nmax_blurr = 3", "unknown option max_blurr; did you mean 'max_blur'?"),
-     ("[blur]\nshutter = 'much'", "shutter: 'much' is not a number"),
+     ("[blur]\njitter = 'much'", "jitter: 'much' is not a number"),
      ("[blur\n", "not TOML: Expected ']' at the end of a table declaration (at line 1, column 6)"),
      ("[blurr]\nshutter = 90", "unknown table [blurr]; did you mean 'blur'?"),
      ("shutter = 90", "shutter is in no table; write it below [blur]"),

@@ -57,7 +57,7 @@ def blur(
         request, _ = request_of(dict(settings), PictureKeywords)
         with clip.get_frame(0) as first:
             coding = coding_of(first)
-        run = request.open(device)
+        run = request.open(device).at(wanted)
         frames = _Frames(clip, steady(run, rate, wanted), rate / wanted, coding)
         frames.shutter = run.request.shutter.make()
     except Error as error:

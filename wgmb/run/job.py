@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -190,12 +191,18 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     A GPU is opened only where the frames hold no motion and `flow` is "auto". InputError where the
     settings make no sense together.
     """
-    request = replace(request, shutter=request.shutter.resolved())
     if request.blur.method is not None:
         check_method(request.blur.method, FRAME_METHODS)
+    if request.shutter.seconds is None:  # says what is wrong with it
+        request.shutter.make()
     clip, shown = request.opened()
+    request = replace(request, shutter=request.shutter.resolved(fps=_rate(request, clip)))
     clip.builder.check_layers()
-    remarks = [*map(_of_scale, request.blur.scale), _of_cuts(request.input.cuts, clip)]
+    remarks = [
+        request.shutter.remark,
+        *map(_of_scale, request.blur.scale),
+        _of_cuts(request.input.cuts, clip),
+    ]
     if request.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
     request = replace(request, averages=_averages(clip, request))
@@ -230,6 +237,15 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         remarks.append(f"the frames have no vectors; motion: {how}")
     told = tuple(filter(None, remarks))
     return Job(request, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+
+
+def _rate(request: BlurRequest, clip: Clip) -> Fraction | None:
+    """Frames per second of the output; of the frames, as their files say; None if they do not."""
+    if request.output.fps is not None:
+        return request.output.rate
+    if request.shutter.seconds is None:
+        return None
+    return clip.source(clip.numbers[0]).rate
 
 
 def _of_cuts(cuts: str | None, clip: Clip) -> str:

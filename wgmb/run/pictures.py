@@ -239,9 +239,11 @@ def blur_pictures(
     if isinstance(holdout, np.ndarray) and request.video.flow == "none":
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
     request.video.expansion.check_pictures(transfer not in ("linear", "pq", "hlg"))
-    run = request.open(device)
+    wanted = rate if fps is None else _rate("fps", fps)
+    request.shutter.resolved(fps=None if fps_in is None else wanted)
+    run = request.open(device).at(wanted)
     held = _held(holdout)
-    made = steady(run, rate, rate if fps is None else _rate("fps", fps), held)
+    made = steady(run, rate, wanted, held)
     return PictureBlur(pictures, made, run.request.shutter.make(), transfer, run.how)
 
 

@@ -189,6 +189,7 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
         raise InputError(f"{reader.name}: does not say its rate; set `fps_in`")
     fps = rate if output.fps in (None, "source") else output.rate_or(rate)
     fps = fps.limit_denominator(FINEST_RATE)
+    run = run.at(fps)
     made, shutter = steady(run, rate, fps), run.request.shutter.make()
 
     def frames(form: Form) -> SteadyFrames:
@@ -202,6 +203,7 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
 
 def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
     plan = run.plan(source, output)
+    run = run.at(plan.fps)
     reader, exposures = plan.reader, run.exposures(plan)
     if reader.is_variable and output.fps in (None, "source"):
         raise InputError(f"{source}: its rate is variable, that of a pipe cannot be; set `fps`")

@@ -38,6 +38,7 @@ from .video_output import sounds_kept, write
 from .video_sink import Form
 
 LOST = 0.05  # share of pictures with something lost, above which it is told
+_ANY_RATE = Fraction(24)  # with which a Blur begins
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
 
@@ -51,11 +52,18 @@ class VideoPlan:
     wanted: OutputFrames
     rate: str
     """A line about the output's rate where it was chosen for the user, or ''."""
+    remark: str = ""
+    """A line about the shutter that a user should know, or ''."""
 
     @property
     def notes(self) -> list[str]:
         """Lines that a user should know."""
-        return [*self.reader.notes, self.rate] if self.rate else self.reader.notes
+        return [*self.reader.notes, *filter(None, (self.rate, self.remark))]
+
+    @property
+    def fps(self) -> Fraction:
+        """Frames per second of the output; on average, if its rate varies."""
+        return 1 / self.wanted[0].interval
 
     @property
     def name(self) -> str:
@@ -81,7 +89,7 @@ class VideoRequest(SettingsGroups):
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
         flow, how = self.video.chosen(opened)
-        shutter = self.shutter.resolved()
+        shutter = self.shutter.resolved(fps=_ANY_RATE)  # see VideoRun.at
         settings = replace(self.blur, method=self.blur.method or flow.method).for_pictures()
         blur = settings.make(shutter.make(), device)
         motion, _ = flow.source(blur.device)
@@ -89,6 +97,8 @@ class VideoRequest(SettingsGroups):
         if searched := self.video.fallback(blur.device):
             how += "; what is too fast for it is searched"
             fallback = self._thorough(shutter.make(), blur), searched
+        if self.shutter.seconds is not None:
+            shutter = replace(shutter, shutter=self.shutter.shutter)
         shown = replace(self, blur=settings, shutter=shutter)
         return VideoRun(shown, blur, motion, how, fallback)
 
@@ -152,7 +162,19 @@ class VideoRun:
         clock = video.clock(reader, self.request.input.frames, sounds_kept(reader, output, video))
         fps, said = _rate(reader, output)
         wanted = OutputFrames(reader, clock, fps, video.longest_pause)
-        return VideoPlan(reader, output, clock, wanted, said)
+        return VideoPlan(reader, output, clock, wanted, said, self.request.shutter.remark)
+
+    def at(self, fps: Fraction | None) -> VideoRun:
+        """The same with its shutter in degrees, of frames at this rate of the output.
+
+        InputError where it is a part of a second, and no rate is known.
+        """
+        shutter = self.request.shutter.resolved(fps=fps)
+        if shutter == self.request.shutter:
+            return self
+        for blur in (self.blur, *self.fallback[:1]) if self.fallback else (self.blur,):
+            blur.shutter = shutter.make()
+        return replace(self, request=replace(self.request, shutter=shutter))
 
     def exposures(self, plan: VideoPlan) -> VideoBlur:
         """The exposures of a video."""
@@ -172,6 +194,8 @@ class VideoRun:
 
     def __call__(self, plan: VideoPlan, progress: Progress | None = None) -> VideoReport:
         """Blur a video into its output, which is complete, or is not there."""
+        if self.request.shutter.seconds is not None:
+            return self.at(plan.fps)(plan, progress)
         begun, request = time.perf_counter(), self.request
         before = self._lost_so_far()
         cuts = CutList(request.input.cuts or "")
@@ -305,7 +329,7 @@ class PictureKeywords(MethodKeywords, total=False):
     samples: int | Literal["auto"]
     jitter: float
     max_blur: float
-    shutter: float
+    shutter: float | str
     phase: Literal["start", "centre", "center", "end"] | float
     curve: str
     rolling: Literal["up", "down", "left", "right"]
@@ -389,7 +413,7 @@ def request_of(
             keywords[name] = f"{keywords[name]:.9f}"
         elif name in keywords and name in _AS_TEXT:
             keywords[name] = str(keywords[name])
-        elif name in keywords and kind is float:
+        elif name in keywords and kind in (float, float | str) and type(keywords[name]) is not str:
             keywords[name] = float(keywords[name])
     if isinstance(keywords.get("holdout"), str):
         keywords["holdout"] = (keywords["holdout"],)

@@ -53,6 +53,12 @@ class FrameFile:
         """The file, and the view if it has one, for messages."""
         return str(self.path) if self.view is None else f"{self.path}: view {self.view}"
 
+    @property
+    def rate(self) -> Fraction | None:
+        """Frames per second, as the file's attribute `framesPerSecond` states them."""
+        stated = self.attributes.get("framesPerSecond")
+        return stated if isinstance(stated, Fraction) and stated > 0 else None
+
     @cached_property
     def color(self) -> list[str]:
         """Names of the picture's channels, 3 or 4 (see layers.find_color)."""

@@ -1,11 +1,13 @@
 """Settings of the shutter."""
 
+import re
 import zlib
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from ..errors import check_choice
+from ..errors import InputError, check_choice
 from ..io.frame_numbers import readable
 from ..scene.scene import Scene
 from ..shutter import (
@@ -17,13 +19,17 @@ from ..shutter import (
 )
 from .record import plain
 
+_FEW_DEGREES = 5  # below, an angle is rather the share of an interval that others count in
+
 
 @dataclass(frozen=True, kw_only=True)
 class ShutterSettings:
     """Shutter angle, phase and curve."""
 
-    shutter: float | None = None
-    "Shutter angle in degrees; 360 is one frame interval. Default: 180 (scenes: their own)."
+    shutter: float | str | None = None
+    """Shutter angle in degrees, where 360 is one frame interval, or a part of a second, such as
+    1/48. Default: 180 (scenes: their own).
+    """
     phase: str = "centre"
     "start (opens at the frame), centre, end (closes at it), or the time of its middle in frames."
     curve: str | None = None
@@ -33,16 +39,59 @@ class ShutterSettings:
     rolling_duration: float = 1.0
     "Rolling shutter: delay from the first row or column to the last, in frame intervals."
 
-    def resolved(self, scene: Scene | None = None, fps: float = 24.0) -> Self:
-        """Return a copy with unset fields taken from the scene, or 180 degrees and a box."""
+    def resolved(self, scene: Scene | None = None, fps: Fraction | float | None = None) -> Self:
+        """Return a copy with unset fields taken from the scene, or 180 degrees and a box.
+
+        `fps`: frames per second of the output, which turn a part of a second into degrees;
+        InputError where one is set and they are not known.
+        """
         degrees, curve = 180.0, "box"
-        if scene is not None and scene.exposure is not None:
+        if scene is not None and scene.exposure is not None and fps is not None:
             seconds, curve = scene.exposure
-            degrees = round(360 * seconds * fps, 9)
-        return replace(
-            self,
-            shutter=degrees if self.shutter is None else self.shutter,
-            curve=curve if self.curve is None else self.curve,
+            degrees = round(360 * seconds * float(fps), 9)
+        if self.shutter is not None:
+            degrees = self.shutter
+        if self.seconds is not None:
+            if fps is None:
+                raise InputError(
+                    f"`shutter` {self.shutter}: a part of a second needs the rate of the frames; "
+                    "set `fps`, or give degrees such as 180"
+                )
+            degrees = float(360 * self.seconds * Fraction(fps))
+        return replace(self, shutter=degrees, curve=curve if self.curve is None else self.curve)
+
+    @property
+    def degrees(self) -> float:
+        """The angle; InputError where a part of a second is set."""
+        angle = self.resolved().shutter
+        assert angle is not None and not isinstance(angle, str)
+        return angle
+
+    @property
+    def seconds(self) -> Fraction | None:
+        """The exposure as a part of a second; None if it is in degrees.
+
+        InputError for a text that is neither.
+        """
+        if not isinstance(self.shutter, str):
+            return None
+        match = re.fullmatch(r"(\d{1,6}(?:\.\d{1,6})?)/(\d{1,6}(?:\.\d{1,6})?)", self.shutter)
+        if match is None or not Fraction(match[2]):
+            raise InputError(
+                f"`shutter` must be degrees such as 180, or a part of a second such as 1/48, "
+                f"got {self.shutter!r}"
+            )
+        return Fraction(match[1]) / Fraction(match[2])
+
+    @property
+    def remark(self) -> str:
+        """A line about an angle that is too small to be one, or ''."""
+        angle = self.shutter
+        if isinstance(angle, str) or angle is None or not 0 < angle < _FEW_DEGREES:
+            return ""
+        return (
+            f"`shutter` {angle:g} means degrees, which hardly blur; Blender's {angle:g} is "
+            f"{360 * angle:g}"
         )
 
     def curve_read(self) -> str | None:
@@ -57,17 +106,17 @@ class ShutterSettings:
         return plain(self) | {"curve": self.curve_read()}
 
     def make(self) -> Shutter:
-        """Return the Shutter these settings describe; call `resolved` first."""
+        """Return the Shutter these settings describe; of scenes, call `resolved` first."""
+        angle = self.degrees
         phase: str | float = self.phase
         if phase not in PHASES:
             try:
                 phase = float(phase)
             except ValueError:
                 check_choice("phase", phase, ("start", "centre", "end"), " or a number")
-        curve = self.curve
-        assert self.shutter is not None and curve is not None
+        curve = self.curve or "box"
         if curve not in CURVES:
             if not readable(Path(curve)):
                 check_choice("curve", curve, CURVES, " or a CSV file")
             curve = read_curve(curve)
-        return Shutter(self.shutter, phase, curve, self.rolling, self.rolling_duration)
+        return Shutter(angle, phase, curve, self.rolling, self.rolling_duration)

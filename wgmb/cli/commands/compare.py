@@ -79,7 +79,7 @@ class CompareSettings:
         self, shutter: ShutterSettings, scene: Scene | None = None
     ) -> dict[str, Shutter]:
         """Return the shutters by label; unset fields are taken from the scene."""
-        settled = shutter.resolved(scene)
+        settled = shutter.resolved(scene, 24 if scene is not None else None)
         try:
             degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
         except ValueError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ... import gpu
 from ...errors import DeviceError
 from ...extras import needed_by
@@ -83,6 +85,7 @@ def view(
         state = state.with_method(settled.method)
     if fps is not None:
         state = viewer.at_rate(state, fps)
+    state = replace(state, shutter=state.shutter.resolved(fps=state.fps))
     if color.remark:
         note(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window), interface=interface)

@@ -43,6 +43,7 @@ class Trial:
     def __init__(self, run: VideoRun, plan: VideoPlan, count: int):
         if not 1 <= count <= MOST:
             raise InputError(f"`try` must be 1 to {MOST}, got {count}")
+        run = run.at(plan.fps)
         is_video = Path(plan.name).suffix.lower() in SUFFIXES
         rate, parts = plan.output.rate_or(plan.reader.rate), []
         for begin, end in places(plan, count, _LENGTH if is_video else 1 / rate):

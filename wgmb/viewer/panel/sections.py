@@ -154,7 +154,7 @@ def _samples(ui: Widgets, state: State) -> State:
 def shutter(ui: Widgets, state: State, info: Info) -> State:
     """Shutter angle, phase and curve."""
     ui.label("angle")
-    now = state.shutter.shutter or 0.0
+    now = state.shutter.degrees
     changed, angle = imgui.slider_float("##shutter", now, 0, 720, "%.0f deg")
     ui.keep("shutter")
     if changed:

@@ -183,7 +183,7 @@ class State:
         if self.suited_blur.samples != other.suited_blur.samples:
             found.append(f"{self.suited_blur.samples or 'own'} samples")
         if shutter.shutter != other.shutter.shutter:
-            found.append(f"{shutter.shutter:g} deg")
+            found.append(f"{shutter.degrees:g} deg")
         if (shutter.phase, shutter.curve) != (other.shutter.phase, other.shutter.curve):
             found.append(f"{shutter.phase}, {shutter.curve}")
         if (video.flow, video.flow_quality) != (other.video.flow, other.video.flow_quality):
