@@ -10,7 +10,7 @@ import numpy as np
 from ..camera import MAX_INDEX
 from ..errors import InputError
 from ..frame import Frame
-from .flow_motion import Found
+from .flow_motion import Found, standing
 from .frame_cache import FrameCache
 from .frame_file import FrameFile, about
 from .layers import alpha, light, vectors
@@ -20,6 +20,7 @@ from .layers.masks import Masks
 from .layers.vector_convention import ConventionFinder
 from .layers.vector_test import ConventionFinding
 
+_ALONE = "is alone in its shot, so no motion can be found, and it is copied"
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
 OPTIONAL = frozenset({"color", "diffuse_light", *layers.TRIPLES})
@@ -68,7 +69,7 @@ class FrameBuilder:
                 motion = vectors.read(own, convention, source.reference_channel)
             camera = self._cameras.get(source.view)
             if motion is None and camera is None and self.picture_motion is not None:
-                motion, guessed = self.picture_motion(source) or (None, None)
+                motion, guessed = self.picture_motion(source) or self._alone(source)
                 depth = guessed if depth is None else depth
             if camera is not None:
                 if depth is None:
@@ -106,6 +107,13 @@ class FrameBuilder:
                 f"the vectors would be {', '.join(sorted(both))} of the picture itself; "
                 "`vector_layer` names another layer, `also` adds that of another file"
             )
+
+    def _alone(self, source: FrameFile) -> Found:
+        """No motion, of a frame that has no neighbour in its shot to find motion from; noted."""
+        on = self._stored.notes.setdefault(_ALONE, [])
+        if source.number not in on:
+            on.append(source.number)
+        return standing(source)
 
     def _color(self, source: FrameFile) -> np.ndarray:
         """The picture, premultiplied; what its alpha seems to mean otherwise is noted."""

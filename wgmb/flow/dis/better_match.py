@@ -177,7 +177,7 @@ class _Source:
         """
         for old in [n for n in self._ways if abs(n - number) > 1]:
             del self._ways[old]
-        for n in (number - 1, number + 1):
+        for n in (number - 1, number, number + 1):
             if n not in self._ways and (found := self._motion_of(n)) is not None and n > number:
                 self._ahead[n] = found
         return lost(self._ways, number, changes)
