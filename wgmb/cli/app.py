@@ -141,10 +141,22 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why("not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
-    except Exception:  # of a library that an interruption left half done
-        if not terminal.interrupted.is_set():
+    except Exception as error:  # of a library that an interruption left half done
+        if terminal.interrupted.is_set():
+            return _say_why("interrupted", INTERRUPTED)
+        if (why := _device_error(error)) is None:
             raise
-        return _say_why("interrupted", INTERRUPTED)
+        return _say_why(str(why), NO_DEVICE)
+
+
+def _device_error(error: Exception) -> Error | None:
+    """The error of the GPU that an exception of wgpu stands for; None where it is none."""
+    if "wgpu" not in sys.modules:
+        return None
+    from ..gpu import translated
+
+    ours = translated(error)
+    return ours if isinstance(ours, Error) else None
 
 
 def _check_text(words: list[str]) -> None:

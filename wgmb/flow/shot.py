@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import wgpu
 
+from .. import gpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
@@ -135,15 +136,16 @@ class Shot:
 
     def __call__(self, number: int) -> tuple[np.ndarray, np.ndarray] | None:
         """(height, width, 4) to_prev, to_next [px] and (height, width) depth of a frame."""
-        textures = self.textures(number)
-        if textures is None:
-            return None
-        images, device = self._passes.images, self._passes.device
-        motion, depth = (
-            images.download(device.create_command_encoder(), texture)
-            for texture in (textures.motion, textures.depth)
-        )
-        return motion, depth[..., 0]
+        with gpu.reported():
+            textures = self.textures(number)
+            if textures is None:
+                return None
+            images, device = self._passes.images, self._passes.device
+            motion, depth = (
+                images.download(device.create_command_encoder(), texture)
+                for texture in (textures.motion, textures.depth)
+            )
+            return motion, depth[..., 0]
 
     def _once(self, stage: str, number: int, level: int, make: Callable[[int, int], Any]) -> Any:
         key = stage, number, level

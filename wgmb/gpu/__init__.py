@@ -14,6 +14,7 @@ from .device import (
     second_device,
     submit,
     texel,
+    translated,
 )
 from .kernels import FrameBindings, Kernel, kernel, stored, uniform
 from .priority import lower_priority, yielding
@@ -38,6 +39,7 @@ __all__ = [
     "stored",
     "submit",
     "texel",
+    "translated",
     "uniform",
     "yielding",
 ]

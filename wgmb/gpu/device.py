@@ -201,24 +201,43 @@ def claim() -> None:
 
 
 @contextmanager
-def reported(size: tuple[int, int]):
-    """Convert wgpu errors raised while working on an image of `size` to wgmb errors.
-
-    GpuMemoryError names the size. DeviceError: the device was lost; the next `open_device`
-    makes a new one.
-    """
+def reported(size: tuple[int, int] | None = None):
+    """Raise wgpu errors as wgmb errors (`translated`); every run and public call passes here."""
     try:
         yield
-    except wgpu.GPUError as error:
-        text = " ".join(str(error).split())
-        if "memory" in text.lower() or isinstance(error, wgpu.GPUOutOfMemoryError):
-            width, height = size
-            raise GpuMemoryError(f"too little GPU memory for {width} x {height} pixels") from None
-        if "lost" in text.lower():
-            _device.cache_clear()
-            forget_kernels()
-            raise DeviceError(f"the GPU device was lost: {text}") from None
-        raise
+    except (wgpu.GPUError, AttributeError) as error:
+        if (ours := translated(error, size)) is error:
+            raise
+        raise ours from None
+
+
+def translated(error: Exception, size: tuple[int, int] | None = None) -> Exception:
+    """The wgmb error that a wgpu error stands for; others as they are.
+
+    GpuMemoryError names the `size` of the image that was worked on. DeviceError: the device was
+    lost; the next `open_device` makes a new one.
+    """
+    text = " ".join(str(error).split())
+    if isinstance(error, AttributeError) and _is_of_wgpu(error):
+        text = "Parent device is lost"
+    elif not isinstance(error, wgpu.GPUError):
+        return error
+    if "memory" in text.lower() or isinstance(error, wgpu.GPUOutOfMemoryError):
+        needed = "{} x {} pixels".format(*size) if size else "this"
+        return GpuMemoryError(f"too little GPU memory for {needed}")
+    if "lost" not in text.lower():
+        return error
+    _device.cache_clear()
+    forget_kernels()
+    return DeviceError(f"the GPU device was lost: {text}")
+
+
+def _is_of_wgpu(error: Exception) -> bool:
+    """True if wgpu itself raised an error: it lets go of parts of a device that is destroyed."""
+    at = error.__traceback__
+    while at is not None and at.tb_next is not None:
+        at = at.tb_next
+    return at is not None and at.tb_frame.f_globals.get("__name__", "").startswith("wgpu.")
 
 
 def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..errors import InputError
+from ..errors import GpuMemoryError, InputError
 from ..frame import Frame
 from ..gpu import timing
 from ..shutter import Shutter
@@ -131,12 +131,13 @@ class _Matrix:
             blur, name = c.blur(samples, Shutter(180), self.device), c.label
             try:
                 self._check(name, size, samples, sum(t.memory for t in timed.values()))
-                timed[name] = one = (
-                    TimedScene(blur, self.clock, size)
-                    if c.needs_scene
-                    else TimedFrame(blur, self.clock, frame)
-                )
-            except (InputError, wgpu.GPUError) as error:
+                with gpu.reported(size):
+                    timed[name] = one = (
+                        TimedScene(blur, self.clock, size)
+                        if c.needs_scene
+                        else TimedFrame(blur, self.clock, frame)
+                    )
+            except (InputError, GpuMemoryError) as error:
                 self.note(f"{_described(size, samples)}: {name} skipped: {error}")
                 continue
             for part in one.parts:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from typing import Any, Literal, Protocol, TypeVar
 
+from .. import gpu
 from ..errors import Error, reason
 from ..threads import Behind, Stop, ahead
 from .report import BatchReport, Progress
@@ -100,7 +101,10 @@ def frames(
     generator ends. One that is not read to its end should be closed.
     """
     is_over = (stop or Stop()).is_set
-    with closing(_read_ahead(input, lambda number, made_of: False, is_over)) as read:
+    with (
+        gpu.reported(),
+        closing(_read_ahead(input, lambda number, made_of: False, is_over)) as read,
+    ):
         blurred = input.blur(_until(is_over, read))
         yield from ahead(blurred, input.ahead, "blur", patience=math.inf)
 
@@ -164,7 +168,8 @@ class _Run:
     def __call__(self) -> BatchReport:
         report = self._report
         try:
-            self._flow()
+            with gpu.reported():
+                self._flow()
             if self._stop.is_set() and not report.stopped and report.rest:
                 report.stopped = ON_REQUEST
             self._end()

@@ -142,7 +142,7 @@ class Viewer:
             except wgpu.DrawCancelled:
                 raise
             except Exception as error:
-                self.failed = _translated(error)
+                self.failed = gpu.translated(error)
                 self._quit()
 
         return guarded
@@ -545,10 +545,3 @@ def _forget_locals(error: BaseException | None) -> None:
     while frame := frame and frame.f_back:
         with suppress(RuntimeError):  # it has not ended
             frame.clear()
-
-
-def _translated(error: Exception) -> Exception:
-    """The same error, or one of ours for a GPU that is gone."""
-    if isinstance(error, wgpu.GPUError) and "lost" in str(error).lower():
-        return DeviceError(f"the GPU was lost: {error}")
-    return error
