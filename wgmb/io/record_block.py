@@ -93,11 +93,14 @@ def _blocks(data: bytes) -> bytes:
     return b"".join(bytes([len(part)]) + part for part in parts) + b"\0"
 
 
-def text_at(data: bytes | mmap.mmap, begin: int, most: int) -> bytes:
+def text_at(file: BinaryIO, begin: int, most: int) -> bytes:
     """At most about `most` bytes of the text that begins there, as it was before `append`."""
-    if data[: len(_GIF)] != _GIF or not begin:
-        return data[begin : begin + most]
-    return _unblocked(data[begin - 1 : begin + most])
+    file.seek(0)
+    if file.read(len(_GIF)) != _GIF or not begin:
+        file.seek(begin)
+        return file.read(most)
+    file.seek(begin - 1)
+    return _unblocked(file.read(most + 1))
 
 
 def _unblocked(data: bytes) -> bytes:
