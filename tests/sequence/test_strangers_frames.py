@@ -296,12 +296,32 @@ UNITS = {  # numbers of a motion to the next frame [px, y down]: as programs wri
 
 
 @pytest.mark.parametrize("kind", ["f2", pytest.param("f4", marks=pytest.mark.full)])
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *list(UNITS)[3:7],
+        *(pytest.param(u, marks=pytest.mark.full) for u in (*list(UNITS)[:3], *list(UNITS)[7:])),
+    ],
+)
 def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
     numbers, names, text = UNITS[unit]
     clip = Clip(of_layers(tmp_path, lambda n: {names: numbers(to_next(n))}, kind))
     assert text in clip.finding
     is_right(clip, 0.05)
+
+
+@pytest.mark.parametrize("unit", ["-1 to 1, backwards", "of the longest motion"])
+def test_what_crosses_half_of_the_picture_does_not_hide_the_unit(tmp_path, unit):
+    """Numbers of a few pixels lie beyond -1 and 1, or 0 and 1."""
+    numbers, names, _ = UNITS[unit]
+
+    def fast(n):
+        motion = to_next(n)
+        motion[-1, -24:] = (70, 0)
+        return {names: numbers(motion)}
+
+    got = motion_of(Clip(of_layers(tmp_path, fast, "f2")))[..., 2:]
+    np.testing.assert_allclose(got[:-1], to_next(5)[:-1], atol=0.05)
 
 
 def test_unreals_unit_is_known_by_its_name(tmp_path):
@@ -335,11 +355,21 @@ def test_vectors_below_a_pixel_of_no_unit_are_told(tmp_path):
     assert "below a pixel" in clip.finding
 
 
-def test_slow_vectors_stay_pixels(tmp_path):
-    velocity = (0.6, 0.3)
+def test_objects_alone_that_all_move_one_way_are_around_half_too(tmp_path):
+    """Nothing is drawn around them, and no number is near 0.5."""
+    for n in NUMBERS:
+        moves = to_next(n).any(axis=2)[..., None]
+        motion = (0.5 - to_next(n) / 10) * moves
+        make.write_exr(tmp_path / f"mv.{n:04d}.exr", rgb(np.dstack([motion, 0 * moves, moves])))
+    clip = Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "mv.####.exr"),)))
+    is_right(clip, 0.05)
+
+
+@pytest.mark.parametrize(("convention", "velocity"), [("nuke", (0.6, 0.3)), ("plain", (0.4, 0.4))])
+def test_slow_vectors_stay_pixels(tmp_path, convention, velocity):
     for n in NUMBERS:
         channels = make.colors(make.picture(n, velocity)) | make.written(
-            "nuke", *make.motion(n, velocity)
+            convention, *make.motion(n, velocity)
         )
         make.write_exr(tmp_path / f"s.{n:04d}.exr", channels)
     got = motion_of(Clip(tmp_path / "s.####.exr"))[..., 2:]
@@ -354,6 +384,7 @@ ONE_WAY = (
     "VectorX,VectorY", "RS_MotionVectors.R,RS_MotionVectors.G", "motionVectorX,motionVectorY",
     "rgba_motionvector.red,rgba_motionvector.green", "flow.u,flow.v",
     "ViewLayer.Motion Vectors.R,ViewLayer.Motion Vectors.G",
+    "_CameraMotionVectorsTexture.R,_CameraMotionVectorsTexture.G",
 )  # fmt: skip
 
 

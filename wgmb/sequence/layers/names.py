@@ -32,7 +32,7 @@ _OF_SPACE = frozenset(
 )  # fmt: skip
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")  # mv2DToonz: mv, 2, D, Toonz
 _VERSION = re.compile(
-    r"[0-9]+|v|raw|pass|aov|filtered|unfiltered"
+    r"[0-9]+|v|raw|pass|aov|filtered|unfiltered|texture|buffer"
 )  # words that say nothing of what a layer holds
 
 

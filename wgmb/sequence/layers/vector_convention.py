@@ -67,29 +67,46 @@ class ConventionFinder:
     def _find_out(self) -> vector_test.ConventionFinding:
         if self._wanted.convention == "none":
             return vector_test.ConventionFinding(None, False, "none requested")
-        found = self._test(_picture)
+        first = self._test(_picture, 0)
+        if first is None:
+            return self._none_found(self._stored.files.on_disk[0])
+        if self._wanted.convention != "auto":
+            return first
+        found = self._best([first, self._test(_picture, 1)])
         if found.is_failed:  # the light may have changed everywhere
-            of_surfaces = self._test(self._surfaces)
-            found = of_surfaces if of_surfaces.sure else found
+            of_surfaces = [self._test(self._surfaces, which) for which in (0, 1)]
+            found = self._best([found, *of_surfaces])
         return found
 
-    def _test(self, look: Look) -> vector_test.ConventionFinding:
-        """The finding by what `look` gives of a frame and of its neighbours."""
-        there = self._stored.files.on_disk
-        found = self._none_found(there[0])
+    @staticmethod
+    def _best(
+        findings: list[vector_test.ConventionFinding | None],
+    ) -> vector_test.ConventionFinding:
+        """The finding that leaves the least difference, or the first one if all are in doubt."""
+        return min(filter(None, findings), key=lambda one: one.left if one.sure else 1.0)
+
+    def _test(self, look: Look, which: int) -> vector_test.ConventionFinding | None:
+        """The finding by what `look` gives of a frame and of its neighbours.
+
+        `which` of the readings of the vectors is tested; None if there are not so many.
+        """
+        there, found = self._stored.files.on_disk, None
         evidence: list[vector_test.Evidence] = []
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
                 source, named = self._named(number)
-                if named is None:
+                if not named:
                     continue
+                if len(named) <= which:
+                    return found
+                own = named[which]
                 if self._wanted.convention != "auto":
-                    return vector_test.ConventionFinding(named, False, str(named))
-                evidence.append(self._evidence(source, named, look))
-                has_both = self._has_both(source, named)
-                found = vector_test.decide(named, evidence, has_both=has_both)
+                    return vector_test.ConventionFinding(own, False, str(own))
+                evidence.append(self._evidence(source, own, look))
+                has_both = self._has_both(source, own)
+                found = vector_test.decide(own, evidence, has_both=has_both)
                 seen = {side for e in evidence for side in e.sides}
-                if found.sure and found.vectors == named and (len(seen) == 2 or not has_both):
+                if found.sure and found.vectors == own and (len(seen) == 2 or not has_both):
                     break
         return found
 
@@ -114,17 +131,18 @@ class ConventionFinder:
                 return vector_test.ConventionFinding(None, False, text, notable=True)
         return none
 
-    def _named(self, number: int) -> tuple[FrameFile, vectors.Vectors | None]:
-        """The vectors that the layers' names speak for, in the first view that has any."""
+    def _named(self, number: int) -> tuple[FrameFile, list[vectors.Vectors]]:
+        """The vectors that the layers' names speak for, in the first view that has any, as they may
+        be read.
+        """
         first = self._stored.leader(number)
         for source in dict.fromkeys((first, *self._stored.all(number))):
             own, near = self._stored.own(source), source.reference_channel
             if named := vectors.named(own, self._wanted, near, source.units):
-                is_open = self._wanted.convention == "auto"
-                return source, vectors.settled(own, named, source.whole, near) if is_open else (
-                    vectors.in_pixels(named, source.whole)
-                )
-        return first, None
+                if self._wanted.convention != "auto":
+                    return source, [vectors.in_pixels(named, source.whole)]
+                return source, vectors.readings(own, named, source.whole, near)
+        return first, []
 
     def _has_both(self, source: FrameFile, named: vectors.Vectors) -> bool:
         """True if the vectors to either frame are layers of their own."""

@@ -31,6 +31,7 @@ _MOVING = 1.0  # [px] slower pixels say nothing about a convention
 _STILL = 0.05  # [px] vectors that are shorter everywhere are 0, unless they have another unit
 _NOTHING = 1e-5  # vectors that are shorter everywhere are 0, whatever their unit
 _TOP = 0.999  # quantile of the speeds that is the fastest of vectors of an unknown unit
+_ACROSS = 2.5  # longer vectors are no fractions of the picture: from -1 to 1 it is 2 wide
 _SLOW = 0.05  # of it: slower pixels say nothing
 _FEWEST = 16  # moving pixels that say anything
 _MOST = 0.3  # difference of tones beyond which a pixel has merely changed
@@ -51,6 +52,7 @@ class ConventionFinding:
     sure: bool  # tested: something moves, and one reading is clearly better than standing still
     text: str  # for people
     notable: bool = False  # not what the names say, or doubtful: people should be told
+    left: float = 1.0  # of the difference to the neighbouring frames, along the vectors
 
     @property
     def is_failed(self) -> bool:
@@ -72,13 +74,18 @@ class Evidence:
     fastest: float = 0.0
     """Length of the longest vectors [px, as read]."""
     is_below: bool = False
-    """All vectors are below a pixel, so that their unit is unknown."""
+    """All vectors are below a pixel, or all but a few."""
     differs: bool = False
     """The picture differs from a neighbour by more than noise; only looked at where `is_below`."""
     whole: tuple[int, int] = (1, 1)
     """Width and height [px] of the whole picture."""
     doubt: str = ""
     """The reason why it cannot be tested."""
+
+    @property
+    def is_open(self) -> bool:
+        """The vectors are so short that they may have another unit than pixels."""
+        return self.is_below or self.fastest < _ACROSS
 
     @property
     def count(self) -> int:
@@ -106,12 +113,12 @@ def gathered(
     if not sides:
         return Evidence(doubt="no neighbouring frame to test it on")
     speeds = _speeds([m for m, _ in sides.values()])
-    at = _some(speeds > _MOVING)
-    fastest, is_below = _fastest(speeds, at), len(at) < _FEWEST
+    moving = speeds > _MOVING
+    fastest, is_below = _fastest(speeds), int(np.count_nonzero(moving)) < _FEWEST
+    at = _some(moving if fastest >= _ACROSS else speeds > max(_SLOW * fastest, _NOTHING))
     if is_below:
         here = tone(color[..., :3])
         differs = any(_differ(here, tone) for _, tone in sides.values())
-        at = _some(speeds > max(_SLOW * fastest, _NOTHING))
         if not differs or len(at) < _FEWEST:
             return Evidence(fastest=fastest, is_below=True, differs=differs, doubt=_NOTHING_MOVES)
     y, x = at.T
@@ -189,24 +196,22 @@ def decide(
         text = (
             f"moved along them, the next frame matches ({left / still:.0%} of the difference left)"
         )
-        return ConventionFinding(vectors, True, f"{vectors}, tested: {text}")
+        text = f"{vectors}, tested: {text}"
+        return ConventionFinding(vectors, True, text, left=left / still)
     meant = best.of(vectors)
     why = f"{left / still:.0%} of the difference to the next frame is left along them"
     text = (
         f"{meant}{_unit(best, tested[0])}, because {why}, and {stated / still:.0%} with {vectors}"
     )
-    return ConventionFinding(meant, True, text, notable=True)
+    return ConventionFinding(meant, True, text, notable=True, left=left / still)
 
 
 def _unit(reading: _Reading, evidence: Evidence) -> str:
     """The unit that a reading gives the vectors, in words."""
     if reading.x != reading.y:
-        if reading.unit in _FRACTIONS:
-            return {1.0: " (fractions of the picture)", 0.5: " (-1 to 1 over the picture)"}[
-                reading.unit
-            ]
-        return f" ({reading.unit:.3g} of the picture)"
-    if evidence.is_below:
+        named = {1.0: "fractions of the picture", 0.5: "-1 to 1 over the picture"}
+        return f" ({named.get(reading.unit, f'{reading.unit:.3g} of the picture')})"
+    if evidence.is_below or (evidence.is_open and reading.x > _SCALES[-1]):
         return f" (1 is {reading.x:.4g} px)"
     return f" (vectors of {1 / reading.x:.3g} frames)" if reading.x != 1 else ""
 
@@ -245,12 +250,12 @@ class _Unit:
 
 def _units(evidence: Evidence) -> list[_Unit]:
     """The units that the vectors of some frames may have."""
-    if not evidence.is_below:
+    if not evidence.is_open:
         return [_Unit(1.0, 1.0, _SCALES, _PLAIN)]
     width, height = evidence.whole
     span = np.log(width * 2) / np.log(_SCALES[1] / _SCALES[0])
     lengths = np.geomspace(0.5, width, int(span) + 1) / max(evidence.fastest, _NOTHING)
-    found = [_Unit(1.0, 1.0, lengths, _POWERS)]
+    found = [_Unit(1.0, 1.0, lengths, (*_PLAIN, *_POWERS))]
     if width != height:
         found.insert(0, _Unit(float(width), float(height), _SCALES, _FRACTIONS))
     return found
@@ -354,10 +359,10 @@ def _speeds(motions: Sequence[np.ndarray]) -> np.ndarray:
     return np.where(np.isfinite(speeds).all(axis=0), speeds.min(axis=0), 0)
 
 
-def _fastest(speeds: np.ndarray, moving: np.ndarray) -> float:
-    """Length of the longest vectors but a few; of the fastest where only a few move."""
+def _fastest(speeds: np.ndarray) -> float:
+    """Length of the longest vectors but a few; of the very longest where only a few move."""
     top = float(np.quantile(speeds, _TOP))
-    return top if top > _NOTHING or len(moving) else float(speeds.max())
+    return top if top > _NOTHING else float(speeds.max())
 
 
 def _some(moving: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ _BACKWARD = ("backward", "toprev", "motionback", "backvector", "backwardvector",
 _PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?(?P<axis>[xyuvXYUV])")
 _UNIT = 0.02  # from 1: the length of a unit vector, in half floats
 _MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
+_NEARLY = 0.9  # of the numbers
 _WIDE = 0.25  # from the middle: where the median of numbers lies that are stored around it
 NOWHERE = 1e4
 """Numbers from here on, either way, stand for no vector: Blender writes 10000 where nothing was
@@ -185,41 +186,46 @@ def in_pixels(vectors: Vectors, whole: tuple[int, int]) -> Vectors:
     return vectors.scaled(*whole) if CONVENTIONS[vectors.convention].of_picture else vectors
 
 
-def settled(
+def readings(
     channels: Mapping[str, np.ndarray],
     vectors: Vectors,
     whole: tuple[int, int],
     near: str | None = None,
-) -> Vectors:
-    """`vectors`, as `named` found them, with what their numbers say, in pixels of `whole`.
+) -> list[Vectors]:
+    """`vectors`, as `named` found them, as their numbers may be read, the likeliest first.
 
-    Numbers from 0 to 1 around 0.5 have 0.5 for no motion, whatever their layer is called; numbers
-    on both sides of 0 have 0.
+    Numbers from 0 to 1 may have 0.5 for no motion, whatever their layer is called; those of a layer
+    that should have it, but lie around 0, have 0. Fractions of a picture, of the size `whole`,
+    become pixels.
     """
     vectors = in_pixels(vectors, whole)
-    sides = channels_of(channels, vectors, near)
     if vectors.offset is not None or vectors.convention == "blender":
-        return vectors
+        return [vectors]
+    sides = channels_of(channels, vectors, near)
     planes = np.stack(
         [channels[name][::3, ::3].ravel() for pair in sides.values() for name in pair]
     )
     planes = planes[:, np.isfinite(planes).all(axis=0) & planes.any(axis=0)].astype(np.float32)
     if not planes.size:
-        return vectors
+        return [vectors]
     if vectors.middle:
-        return replace(vectors, offset=0.0) if _is_around(planes, 0, _WIDE) else vectors
-    if planes.min() < 0 or planes.max() > 1 or not _is_around(planes, 0.5, _WIDE):
-        return vectors
-    if list(sides) != ["next"]:
-        return replace(vectors, offset=0.5)
-    return replace(vectors, convention="rsmb", layer=_layer_of(channels, sides["next"], near))
+        return [replace(vectors, offset=0.0) if _are_around(planes, 0) else vectors]
+    low, high = np.quantile(planes, (1 - _NEARLY, _NEARLY))  # what is too fast may lie beyond
+    if low < 0 or high > 1:
+        return [vectors]
+    if list(sides) == ["next"]:
+        layer = _layer_of(channels, sides["next"], near)
+        coded = replace(vectors, convention="rsmb", layer=layer)
+    else:
+        coded = replace(vectors, offset=0.5)
+    return [coded, vectors] if _are_around(planes, 0.5) else [vectors, coded]
 
 
-def _is_around(planes: np.ndarray, middle: float, most: float) -> bool:
-    """Return True if the medians of all planes are near `middle`, and numbers lie on both sides."""
+def _are_around(planes: np.ndarray, middle: float) -> bool:
+    """Return True if the medians of all planes are near `middle`, and numbers lie around it."""
     apart = planes - np.float32(middle)
-    is_near = np.abs(np.median(apart, axis=1)) < most
-    return bool(is_near.all()) and bool(apart.min() < 0 < apart.max())
+    is_near = np.abs(np.median(apart, axis=1)) < _WIDE
+    return bool(is_near.all()) and bool(apart.min() <= 0 <= apart.max())
 
 
 def _layer_of(names: Iterable[str], pair: tuple[str, str], near: str | None) -> str:
