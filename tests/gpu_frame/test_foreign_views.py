@@ -69,6 +69,16 @@ def blurred(device, method="tap", **views):
     return images.download(encoder, output)
 
 
+def test_a_texture_is_taken_in_place_of_its_view(device):
+    """It ended with AttributeError."""
+    expected = blurred(device, to_next=moving(device))
+    color = texture(device, "rgba32float", [LIGHT, LIGHT, LIGHT, 1], "f4").texture
+    blur, images = Blur("tap", samples=4, device=device), TexturePool(device)
+    output, encoder = images.texture("output", SIZE, blur.output), device.create_command_encoder()
+    blur.encode(encoder, FrameViews(color=color, to_next=moving(device).texture), output)
+    np.testing.assert_array_equal(images.download(encoder, output), expected)
+
+
 def moving(device, format="rg32float"):
     count = 4 if "rgba" in format else 2
     return texture(device, format, [3, -2, -3, 2][:count], "f2" if "16" in format else "f4")

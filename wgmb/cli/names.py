@@ -10,17 +10,13 @@ from pathlib import Path
 from ..errors import InputError
 from ..io import stills
 from ..io.frame_numbers import is_pattern
-from ..io.suffixes import VIDEOS
+from ..io.suffixes import KNOWN_VIDEOS, VIDEOS
 from ..output.names import refuse_inputs
 from ..sequence.frame_file import is_video
 
 NAME = "{name}"
 """In an output: the name of the input without folder and suffix."""
 _ELSE = ".mkv"  # what holds every stream, for inputs whose own container is not written
-_IN_FOLDERS = (
-    *VIDEOS, ".m4v", ".avi", ".ts", ".mts", ".m2ts", ".mpg", ".mpeg", ".vob", ".wmv", ".flv",
-    ".ogv", ".3gp", ".mxf",
-)  # fmt: skip
 
 
 def is_batch(patterns: Sequence[str], output: str) -> bool:
@@ -37,10 +33,10 @@ def videos_of(patterns: Sequence[str]) -> list[Path]:
         path = Path(pattern)
         if path.is_dir():
             inside = sorted(
-                p for p in path.iterdir() if p.suffix.lower() in _IN_FOLDERS and p.is_file()
+                p for p in path.iterdir() if p.suffix.lower() in KNOWN_VIDEOS and p.is_file()
             )
             if not inside:
-                known = " ".join(_IN_FOLDERS)
+                known = " ".join(KNOWN_VIDEOS)
                 raise InputError(
                     f"{pattern}: a folder without videos ({known}); frames need a pattern such as "
                     f"{path / 'shot.####.exr'}"
@@ -56,9 +52,10 @@ def videos_of(patterns: Sequence[str]) -> list[Path]:
     for path in found:
         is_frames = is_pattern(path) and not path.is_file()
         if is_frames or path.suffix.lower() in (".exr", *stills.SUFFIXES):
+            such = next((p.replace("*", "####") for p in patterns if _is_of_frames(p)), "")
             raise InputError(
                 f"{path}: several inputs must be videos; frames need one pattern such as "
-                "'shot.####.exr', in quotes"
+                f"'{such or 'shot.####.exr'}', in quotes"
             )
     return found
 
@@ -97,6 +94,11 @@ def _output_of(video: Path, output: str) -> str:
 
 def _is_folder(output: str) -> bool:
     return output.endswith(("/", os.sep)) or Path(output).is_dir()
+
+
+def _is_of_frames(pattern: str) -> bool:
+    """Return True for shot.*.exr."""
+    return Path(pattern).name.count("*") == 1 and "." in pattern.partition("*")[2]
 
 
 def _has_wildcard(pattern: str) -> bool:

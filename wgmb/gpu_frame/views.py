@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, fields
 from functools import cache
+from typing import Any
 
 import wgpu
 
@@ -31,7 +32,7 @@ _INDEX = {"format": "r32uint", "if_used": False}
 class FrameViews:
     """One frame as views of textures, all of one size; names, units and meanings as in Frame.
 
-    Only `color` is required.
+    Only `color` is required. A texture is taken in place of its default view.
     """
 
     color: View
@@ -78,6 +79,8 @@ class FrameViews:
         return self.color.size[0], self.color.size[1]
 
     def __post_init__(self) -> None:
+        for name in _LIKE:
+            object.__setattr__(self, name, view_of(getattr(self, name)))
         object.__setattr__(self, "window", window_of(self.window, self.camera))
 
     @property
@@ -119,6 +122,11 @@ class FrameViews:
 TEXTURES = {f.name: f.metadata for f in fields(FrameViews) if "format" in f.metadata}
 """The per-pixel inputs beside `color`: `format` and `if_used` by name."""
 _LIKE = {"color": "filterable"} | {name: data["format"] for name, data in TEXTURES.items()}
+
+
+def view_of(texture: Any) -> Any:
+    """The default view of a texture; all else as it is."""
+    return texture.create_view() if isinstance(texture, wgpu.GPUTexture) else texture
 
 
 def check_view(name: str, view: View, device: wgpu.GPUDevice, size: tuple[int, int]) -> None:

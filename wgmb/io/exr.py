@@ -6,6 +6,7 @@ that is an error that names the file.
 
 from __future__ import annotations
 
+import contextlib
 import io
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
@@ -34,6 +35,7 @@ COMPRESSIONS = {
 }
 """The library's names of what every program reads; see also `check_compression`."""
 _SAME = "same"
+_MAGIC = b"\x76\x2f\x31\x01"
 _DEEP = OpenEXR.deepscanline, OpenEXR.deeptile
 _FLATTENED = "deep pixels are flattened, the nearest sample first"
 _VOLUMES = "; volumes (ZBack) count as points at their front"
@@ -262,7 +264,15 @@ def _open(path: Path, *, header_only: bool):
     except MemoryError:
         raise InputError(f"{path}: not enough memory to read it") from None
     except (RuntimeError, ValueError, TypeError, OSError, ArithmeticError) as error:
+        if not _begins_as_exr(path):
+            raise InputError(f"{path}: not an EXR file, whatever its name") from None
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
+
+
+def _begins_as_exr(path: Path) -> bool:
+    with contextlib.suppress(OSError), open(path, "rb") as file:
+        return file.read(len(_MAGIC)) == _MAGIC
+    return True  # it cannot be read, which the library says
 
 
 def _short_of_memory(heard: list[str], needed: int) -> bool:

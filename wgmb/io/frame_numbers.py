@@ -11,7 +11,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from fileseq.frameset import FrameSet
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MOST_FRAMES = 1_000_000
 """Largest number of frames in one run."""
 _NUMBER = re.compile(r"[#@]+|%0*([0-9]{0,3})d|\$F0*([0-9]{0,3})")
+_COUNTED = re.compile(r"\d+(?=\.[A-Za-z]\w*$)")  # the number of a frame, before the suffix
 _COLON = re.compile(r"(-?\d+)\s*-\s*(-?\d+)\s*:\s*(\d+)")
 _RANGE = re.compile(r"(-?\d+)\s*-\s*(-?\d+)(?:\s*x\s*(\d+))?")
 
@@ -155,8 +156,21 @@ def numbers_on_disk(pattern: str | Path) -> list[int]:
         raise InputError(f"{parsed.folder}: {(why or str(error)).lower()}") from None
     found = sorted({int(m[1]) for m in matches if m[0] in parsed.names(int(m[1]))})
     if not found:
-        raise InputError(f"{pattern}: no such frames")
+        raise InputError(f"{pattern}: no such frames{_near(pattern)}")
     return found
+
+
+def patterns_in(folder: str | Path) -> list[str]:
+    """The names of the sequences in a folder, with # for the digits of their numbers."""
+    names = [name for name in os.listdir(folder or ".") if _COUNTED.search(name)]
+    return sorted({_COUNTED.sub(lambda m: "#" * len(m[0]), name) for name in names})
+
+
+def _near(pattern: str | Path) -> str:
+    """The end of a message on frames that are not there: a sequence that may be meant, or ''."""
+    folder, name = os.path.split(str(pattern))
+    meant = did_you_mean(name, patterns_in(folder))
+    return meant if folder == "" else meant.replace("'", f"'{folder}{os.sep}", 1)
 
 
 def frame_numbers(text: str, name: str = "frames") -> list[int]:

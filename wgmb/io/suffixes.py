@@ -3,3 +3,8 @@
 STILLS = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 VIDEOS = (".mp4", ".mov", ".mkv", ".webm", ".gif")
 """Those that are written; any video that FFmpeg knows is read."""
+KNOWN_VIDEOS = (
+    *VIDEOS, ".m4v", ".avi", ".ts", ".mts", ".m2ts", ".mpg", ".mpeg", ".vob", ".wmv", ".flv",
+    ".ogv", ".3gp", ".mxf",
+)  # fmt: skip
+"""Those that a name alone tells."""

@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 from ..errors import InputError
 from ..io.frame_numbers import is_pattern, numbered, numbers_on_disk
+from ..io.suffixes import STILLS, VIDEOS
+
+ENDS = ".exr", *STILLS, *VIDEOS
+"""The ends of the names of outputs."""
+
+
+def check_suffix(pattern: str | Path, known: Collection[str] = ENDS) -> None:
+    """InputError for an output of a kind that is not among the `known`."""
+    if Path(pattern).suffix.lower() not in known:
+        raise InputError(f"output {pattern}: the name must end in one of {', '.join(known)}")
 
 
 def refuse_inputs(

@@ -34,7 +34,7 @@ from ..sequence.input_color import space_of
 from ..sequence.layers import alpha, vectors
 from . import finished_videos
 from .exr_layers import with_results
-from .names import prepare, refuse_inputs, that_exist
+from .names import ENDS, check_suffix, prepare, refuse_inputs, that_exist
 from .result import Result
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Output:
     name or a setting that does not fit, and for existing files.
     """
 
-    _ENDS: ClassVar[tuple[str, ...]] = (".exr", *STILLS, *VIDEOS)
+    _ENDS: ClassVar[tuple[str, ...]] = ENDS
     _has_record = True  # every file holds one
 
     def __init__(
@@ -95,9 +95,7 @@ class Output:
         self._overwrite, self._resume, self._since = overwrite, resume, since
         self._abandoned, self._is_whole, self._count, self._replaces = False, True, 0, overwrite
         self._under_way: Path | None = None
-        if suffix not in self._ENDS:
-            known = ", ".join(self._ENDS)
-            raise InputError(f"output {pattern}: the name must end in one of {known}")
+        check_suffix(pattern, self._ENDS)
         if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
             raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
         is_video = suffix in VIDEOS

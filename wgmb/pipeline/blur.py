@@ -29,6 +29,7 @@ from ..gpu_frame.views import (
     View,
     check_output,
     check_view,
+    view_of,
 )
 from ..methods import FRAME_METHODS, METHODS, check_method
 from ..methods.contract import (
@@ -169,7 +170,7 @@ class Blur:
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
         passes at once instead of recording them.
         """
-        size = frame.size
+        size, output, confidence = frame.size, view_of(output), view_of(confidence)
         around = {"": (0, frame)}
         near = {"prev.": (-1, prev), "next.": (1, next)}
         near |= {"prev.prev.": (-2, prev and prev_prev), "next.next.": (2, next and next_next)}
@@ -209,6 +210,7 @@ class Blur:
         the number to add.
         """
         gpu.check_size(self.device, *scene.size)
+        output = view_of(output)
         check_view("output", output, self.device, scene.size)
         check_output("output", output, self.output)
         self._require({"scene"})
@@ -316,6 +318,7 @@ class Blur:
         self, encoder: wgpu.GPUCommandEncoder, frame: FrameViews, output: View, number: int = 0
     ) -> None:
         """Record to_prev and to_next [px] into `output`, rgba32float."""
+        output = view_of(output)
         frame.check_fit(self.device, output.size[:2])
         check_view("output", output, self.device, frame.size)
         check_output("output", output, "rgba32float")

@@ -26,6 +26,7 @@ from ..io.frame_numbers import (
 )
 from ..io.suffixes import STILLS
 from ..methods import FRAME_METHODS, METHODS, check_method
+from ..output.names import check_suffix
 from ..output.output import Output
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
@@ -195,6 +196,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         check_method(request.blur.method, FRAME_METHODS)
     if request.shutter.seconds is None:  # says what is wrong with it
         request.shutter.make()
+    check_suffix(request.output.output)
     clip, shown = request.opened()
     request = replace(request, shutter=request.shutter.resolved(fps=_rate(request, clip)))
     clip.builder.check_layers()

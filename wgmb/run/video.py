@@ -34,7 +34,7 @@ from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .engine import Blurred, Input, IsDone
 from .report import Progress, VideoReport
-from .video_output import sounds_kept, write
+from .video_output import check_output, sounds_kept, write
 from .video_sink import Form
 
 LOST = 0.05  # share of pictures with something lost, above which it is told
@@ -157,8 +157,9 @@ class VideoRun:
 
     def plan(self, path: str | Path, output: OutputSettings) -> VideoPlan:
         """Open a video; InputError if it cannot be read or has no pictures in the range."""
-        reader = VideoReader(path, max_mb=self.request.input.max_mb)
         video = self.request.video
+        check_output(output, video, path)
+        reader = VideoReader(path, max_mb=self.request.input.max_mb)
         clock = video.clock(reader, self.request.input.frames, sounds_kept(reader, output, video))
         fps, said = _rate(reader, output)
         wanted = OutputFrames(reader, clock, fps, video.longest_pause)

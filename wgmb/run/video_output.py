@@ -12,8 +12,9 @@ from typing import Any, Protocol
 import wgpu
 
 from ..io import atomic, record
+from ..io.pipes import is_pipe
 from ..output.finished_videos import is_finished
-from ..output.names import beyond, refuse_inputs
+from ..output.names import beyond, check_suffix, refuse_inputs
 from ..settings import OutputSettings
 from ..settings.video import VideoSettings
 from ..video.clock import Clock
@@ -21,6 +22,7 @@ from ..video.output_times import OutputFrame, OutputFrames
 from ..video.read.reader import VideoReader
 from ..video.write.encoders import SUFFIXES, chosen
 from ..video.write.format import VideoFormat
+from ..video.write.gif import check_rate
 from ..video.write.other_streams import OtherStreams, sounds_in
 from ..video.write.segments import Segments, remove_left
 from ..video.write.writer import VideoWriter
@@ -61,6 +63,24 @@ def sounds_kept(reader: VideoReader, output: OutputSettings, video: VideoSetting
     if suffix not in SUFFIXES or video.streams != "all":
         return []
     return sounds_in(reader.path, suffix, is_encoded=video.pace != 1)
+
+
+def check_output(output: OutputSettings, video: VideoSettings, source: str | Path) -> None:
+    """InputError for an output that cannot be made of a video, before that is opened.
+
+    This is about what needs no look at the input: the kind of file, its codec, a rate that is set,
+    and an output that is the input.
+    """
+    if is_pipe(output.output):
+        return
+    path = Path(output.output)
+    check_suffix(path)
+    if path.suffix.lower() in SUFFIXES:
+        chosen(path, video.codec, video.quality, video.encoder)
+        if path.suffix.lower() == ".gif" and output.fps not in (None, "source"):
+            check_rate(path, output.rate)
+    there = [path] if os.path.exists(os.path.realpath(path)) else []
+    refuse_inputs(path.parent, [path.name], there, [Path(source)])
 
 
 def write(

@@ -14,7 +14,8 @@ from ..errors import InputError
 from ..extent import Extent
 from ..frame import Frame
 from ..io import limits
-from ..io.frame_numbers import numbered
+from ..io.frame_numbers import numbered, patterns_in
+from ..io.suffixes import KNOWN_VIDEOS, STILLS
 from ..shots.cut_list import CutList
 from ..shots.motion import MotionSource
 from .data_windows import Placement
@@ -24,12 +25,26 @@ from .findings import SequenceFindings
 from .flow_motion import PictureMotion, standing
 from .frame_builder import OPTIONAL, FrameBuilder
 from .frame_cache import FrameCache
-from .frame_file import FrameFile
+from .frame_file import FrameFile, is_video
 from .layers.light import LightPasses
 from .layers.masks import Masks
 from .layers.passes import Passes
 from .layers.vector_convention import ConventionFinder
 from .neighbours import Neighbours
+
+_SHOWN = 5  # sequences of a folder that are named
+
+
+def _check_kind(pattern: str | Path) -> None:
+    """InputError for what is no frames: a video, or a folder, whose sequences are named."""
+    path = Path(pattern)
+    if path.is_dir():
+        kinds = ".exr", *STILLS
+        found = [str(path / name) for name in patterns_in(path) if name.lower().endswith(kinds)]
+        holds = f"its frames are {', '.join(found[:_SHOWN])}" if found else "it holds no frames"
+        raise InputError(f"{pattern}: a folder; {holds}")
+    if path.suffix.lower() in KNOWN_VIDEOS and is_video(path):
+        raise InputError(f"{pattern}: a video; wgmb.blur_video takes it, a Clip takes frames")
 
 
 class Clip:
@@ -72,6 +87,7 @@ class Clip:
         another Clip of the same sequence (`settle()`), which are then not determined again.
         InputError for missing files, gaps and settings that do not fit.
         """
+        _check_kind(pattern)
         self._space, self._settled, self._max_mb = space, settled, max_mb
         self._cut_list = CutList(cuts or "")
         self.pattern, self.passes, self.view = str(pattern), passes or Passes(), view

@@ -100,7 +100,10 @@ def _check_output(output: OutputSettings, video: VideoSettings) -> None:
     if suffix in (".exr", *stills.SUFFIXES) and is_pattern(path):
         return  # how many frames there are depends on the video
     if suffix not in SUFFIXES:
-        raise InputError(f"output {path}: must be a video {' '.join(SUFFIXES)}, or a frame pattern")
+        raise InputError(
+            f"output {path}: must be a video {' '.join(SUFFIXES)}, a frame pattern, or a folder, "
+            "whose name ends in /"
+        )
     chosen(path, video.codec, video.quality, video.encoder)
     if os.path.exists(os.path.realpath(path)) and not (output.overwrite or output.resume):
         raise InputError(f"{path} exists; --overwrite replaces it, --resume keeps finished videos")

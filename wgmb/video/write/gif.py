@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -22,9 +23,10 @@ def check_rate(path: Path, fps: Fraction, rates: tuple[Fraction, Fraction] = _RA
     """InputError for a rate that is not within `rates`, by default those that a GIF can have."""
     least, most = rates
     if not least <= fps <= most:
+        fits = f"; `fps={float(fps / math.ceil(fps / most)):g}` fits" if fps > most else ""
         raise InputError(
             f"output {path}: {path.suffix} takes {least} to {most} frames per second, "
-            f"got {float(fps):g}"
+            f"got {float(fps):g}{fits}"
         )
 
 

@@ -69,7 +69,7 @@ def lines(
 
 def method_line(state: State, available: Available, is_preview: bool = False) -> str:
     """The method and its samples; why it is not gather, where that cannot be had."""
-    if is_preview:
+    if is_preview and state.method != QUICKEST:
         return f"method   {QUICKEST}, a preview of {state.method}"
     samples = state.suited_blur.samples or getattr(METHODS[state.method], "samples", SAMPLES)
     text = f"method   {state.method}, {samples} samples"
