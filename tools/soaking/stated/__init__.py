@@ -57,7 +57,7 @@ class StatedKind:
     """A changed file may hold another picture for a right reason, such as a larger window."""
 
 
-_MODULES = ("stills", "frames", "videos")  # of this package; each has KINDS
+_MODULES = ("stills", "frames", "tables", "videos")  # of this package; each has KINDS
 
 
 def all_kinds() -> dict[str, StatedKind]:
