@@ -1,16 +1,21 @@
 """Facts about a video that are no streams: crop, time code, names of data, views and colours."""
 
+import struct
 from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
+from PIL import Image, features
 
 import make_clips as clips
 from wgmb import blur_video
+from wgmb.cli.app import main
+from wgmb.sequence.frame_file import is_video
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.stream_text import _read, cropped, whole_samples
 from wgmb.video.write.time_code import moved
+from wgmb.video.write.views import stereo_mode
 
 
 def inserted(data: bytes, path: list[int], element: bytes) -> bytes:
@@ -164,3 +169,96 @@ def test_streams_of_data_are_named(tmp_path, capsys):
     assert (data.kind, data.text) == ("data", "telemetry (KLV)")
     report = blur_video(source, tmp_path / "b.mp4", flow="none")
     assert report.left_out == ["stream 1 (telemetry (KLV)) is left out"]
+
+
+def element(number: int, content: bytes) -> bytes:
+    return number.to_bytes(2) + bytes([0x80 | len(content)]) + content
+
+
+SPHERES = {
+    "whole": element(0x7671, b"\x01"),
+    "turned": element(0x7671, b"\x01") + element(0x7673, struct.pack(">f", 30.0)),
+    "part": element(0x7671, b"\x01") + element(0x7672, struct.pack(">5I", 0, 99, 88, 7, 6)),
+    "cube": element(0x7671, b"\x02") + element(0x7672, struct.pack(">3I", 0, 0, 5)),
+}
+
+
+@pytest.mark.parametrize("kind", ["mkv", "mp4"])
+@pytest.mark.parametrize(
+    ("to", "codec"),
+    [("mkv", "h264"), ("mp4", "h264"), ("mp4", "av1"), ("mkv", "ffv1"), ("webm", "vp9")],
+)
+@pytest.mark.parametrize("sphere", SPHERES)
+def test_360_degrees_are_kept(tmp_path, sphere, kind, to, codec):
+    source = matroska(tmp_path / "a.mkv", (0x7670, SPHERES[sphere]))
+    wanted = VideoReader(source).projection
+    assert wanted is not None
+    if kind == "mp4":
+        blur_video(source, tmp_path / "a.mp4", flow="none")
+        source = tmp_path / "a.mp4"
+    path = tmp_path / f"b.{to}"
+    report = blur_video(source, path, flow="none", codec=codec, resume=codec == "h264")
+    assert report.left_out == []
+    reader = VideoReader(path)
+    assert reader.projection == wanted
+    assert len(list(reader)) == len(VideoReader(source)) == 8 and not reader.loss()
+
+
+@pytest.mark.parametrize("mode", ["left_right", "top_bottom", "right_left", "row_interleaved_lr"])
+@pytest.mark.parametrize("to", ["mkv", "mp4", "mov", "gif"])
+def test_two_views_are_kept_or_said(tmp_path, mode, to):
+    def setup(stream):
+        stream.metadata["stereo_mode"] = mode
+
+    source = matroska(tmp_path / "a.mkv", setup=setup)
+    report = blur_video(source, tmp_path / f"b.{to}", flow="none")
+    is_held = to == "mkv" or (to == "mp4" and mode in ("left_right", "top_bottom"))
+    said = f"that it has two views ({mode.replace('_', ' ')}) is not kept (.mkv holds most)"
+    assert (said in report.left_out) != is_held
+    reader = VideoReader(tmp_path / f"b.{to}")
+    assert len(list(reader)) == 8
+    if is_held:
+        assert stereo_mode(reader.facts) == mode
+        again = tmp_path / "c.mkv"
+        blur_video(tmp_path / f"b.{to}", again, flow="none", resume=True)
+        assert stereo_mode(VideoReader(again).facts) == mode
+
+
+def test_a_sphere_that_a_container_cannot_hold_is_said(tmp_path):
+    source = matroska(tmp_path / "a.mkv", (0x7670, SPHERES["turned"]))
+    for to in ("b.mov", "b.gif"):
+        report = blur_video(source, tmp_path / to, flow="none")
+        assert any("360 degrees" in line for line in report.left_out)
+
+
+def animated(path, kind):
+    """Four pictures that are transparent at the left."""
+    alpha = np.tile(np.arange(64, dtype=np.uint8) * 4, (48, 1))
+    images = [
+        Image.fromarray(np.dstack([np.full((48, 64), 60 * n, np.uint8)] * 3 + [alpha]))
+        for n in range(4)
+    ]
+    images[0].save(path, kind, save_all=True, append_images=images[1:], duration=100)
+    return path
+
+
+def test_an_animated_png_is_a_video_whatever_its_name(tmp_path):
+    path = animated(tmp_path / "a.png", "PNG")
+    assert is_video(path)
+    still = tmp_path / "b.png"
+    Image.new("RGB", (8, 8)).save(still)
+    assert not is_video(still) and not is_video(tmp_path / "none.png")
+    assert main(["blur", str(path), "-o", str(tmp_path / "c.mov"), "--flow", "none"]) == 0
+    reader = VideoReader(tmp_path / "c.mov")
+    assert len(reader) == 4 and reader.coding.alpha
+
+
+@pytest.mark.skipif(not features.check("avif"), reason="Pillow without AVIF")
+def test_transparency_of_avif_that_is_not_read_is_said(tmp_path):
+    path = animated(tmp_path / "a.avif", "AVIF")
+    assert "its transparency (a stream of its own, in AVIF) is not read" in VideoReader(path).notes
+
+
+def test_transparency_that_a_gif_loses_is_said_as_it_is(tmp_path):
+    report = blur_video(animated(tmp_path / "a.apng", "PNG"), tmp_path / "b.gif", flow="none")
+    assert any(line.startswith("wgmb writes no transparent GIF") for line in report.left_out)

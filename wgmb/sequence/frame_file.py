@@ -25,6 +25,7 @@ from .data_windows import Window, laid
 from .layers import light, names, stereo, vectors
 
 _SUFFIXES = (".exr", *stills.SUFFIXES, data_files.FLO)
+_BEFORE_PICTURE = 1 << 16  # bytes of a PNG
 _NO_PICTURE = "view {} has no picture and is left as it is"
 
 
@@ -163,9 +164,17 @@ def _is_same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def is_video(pattern: str | Path) -> bool:
-    """Return True for a file that is neither an EXR nor a still."""
+    """Return True for a file that is neither an EXR nor a still; an animated PNG is none."""
     path = Path(pattern)
-    return path.suffix.lower() not in _SUFFIXES and readable(path)
+    suffix = path.suffix.lower()
+    return readable(path) and (suffix not in _SUFFIXES or (suffix == ".png" and _moves(path)))
+
+
+def _moves(png: Path) -> bool:
+    """Return True for a PNG that states, before its first picture, that it has several."""
+    with contextlib.suppress(OSError), open(png, "rb") as file:
+        return b"acTL" in file.read(_BEFORE_PICTURE).split(b"IDAT", 1)[0]
+    return False
 
 
 def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:

@@ -114,6 +114,15 @@ def picture_stream(container: InputContainer, path: Path | str) -> VideoStream:
     return chosen
 
 
+def has_alpha_beside(container: InputContainer, pictures: VideoStream) -> bool:
+    """Return True if another stream holds the transparency of the pictures, as in animated AVIF."""
+    return any(
+        _is_grey(other) and other.frames == pictures.frames > 1
+        for other in container.streams.video
+        if other.index != pictures.index and not _is_grey(pictures)
+    ) and "avis" in str(container.metadata.get("major_brand", ""))
+
+
 def _is_grey(stream: VideoStream) -> bool:
     context = stream.codec_context
     return context is not None and (context.pix_fmt or "").startswith("gray")

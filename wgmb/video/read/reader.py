@@ -35,7 +35,7 @@ from ..pixels import (
 )
 from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
-from .container import HELD_CHANNELS, opened, picture_stream, size_of
+from .container import HELD_CHANNELS, has_alpha_beside, opened, picture_stream, size_of
 from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
@@ -121,6 +121,8 @@ class VideoReader:
             self._pixel_aspect = stream.sample_aspect_ratio or Fraction(1)
             if stream.metadata.get("alpha_mode") == "1":
                 self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
+            if has_alpha_beside(container, stream):
+                self.notes.append("its transparency (a stream of its own, in AVIF) is not read")
             self._packets = scanned(container, stream, self.path)
 
     def _check_size(self, stream: VideoStream) -> None:
@@ -162,6 +164,7 @@ class VideoReader:
         side = side_data_of(frame)
         self._turn = rotation_of(side.get(Type.DISPLAYMATRIX), frame.rotation)
         self.mastering, self.light_level = mastering_of(side), light_level_of(side)
+        self.projection, self.stereo = side.get(Type.SPHERICAL), side.get(Type.STEREO3D)
         tags = either(tags_of(frame), self._tagged)
         coding, self.assumed = assumed(found, self._frame_size, self.codec, tags)
         turned = coding.steps[::-1] if self._turn.swaps else coding.steps
@@ -292,7 +295,9 @@ class VideoReader:
     @property
     def facts(self) -> Facts:
         """Facts about the pictures besides their coding."""
-        return Facts(self.pixel_aspect, self.mastering, self.light_level)
+        return Facts(
+            self.pixel_aspect, self.mastering, self.light_level, self.projection, self.stereo
+        )
 
     @property
     def rotation(self) -> int:

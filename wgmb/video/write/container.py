@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, cast
 
 import av
+import numpy as np
 from av.container import OutputContainer
 from av.error import FFmpegError
 from av.packet import Packet
@@ -19,6 +21,8 @@ from ...color.coding import Coding
 from ...errors import InputError
 from ...io import atomic, record_block
 from ...io import record as records
+from ..pixels import buffer
+from . import views
 from .encoders import CONTAINERS, HARDWARE, Encoding
 from .format import VideoFormat
 from .scheduling import kept_scheduling
@@ -28,7 +32,7 @@ _RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
 _FEW = 2  # frames: x265 states no decoding times for so few
 # No checksum of the texts, which the seal changes; no random number as the file's name.
 _MATROSKA = {"write_crc32": "0", "fflags": "+bitexact"}
-_MUXING = {"matroska": _MATROSKA, "webm": _MATROSKA}
+_MUXING = {"matroska": _MATROSKA, "webm": _MATROSKA, "mp4": {"strict": "unofficial"}}  # 360 degrees
 
 
 class NewFile:
@@ -44,6 +48,7 @@ class NewFile:
     ):
         self.path, self.temporary = path, temporary
         self.is_new, self.is_complete = False, True
+        self.has_views = False  # two in each picture, or a projection
         self._record = record
         self._texts, options, self.left_out = fitting(suffix, metadata)
         self._container: OutputContainer | None = None
@@ -80,6 +85,8 @@ class NewFile:
             if self._container is not None:
                 self._container.close()
                 self._container = None
+            if self.has_views and self.path.suffix.lower() == ".mp4":
+                views.leave_one_form(self.temporary)
             self._add_texts()
             if self._lock is not None:
                 os.fsync(self._lock)
@@ -129,13 +136,29 @@ class VideoFile(NewFile):
         record: str = "",
     ):
         super().__init__(path, temporary, format.encoding.suffix, metadata or {}, record)
+        self.has_views = views.are_stated(format.facts)
         self._base, self._rate, self._packets = format.base, format.rate, 0
         self._late_times = format.encoding.encoder.name == "libx265"
+        self._source: OutputContainer | None = None  # of an encoder, beside the file
+        self._into: VideoStream | None = None  # of the file, if the encoder has another
         try:
-            self._stream = begin(self.container, format)
+            self._stream = self._begun(format)
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise _why(path, format.encoding, error) from None
+
+    def _begun(self, format: VideoFormat) -> VideoStream:
+        """The stream that encodes; that of the file is `_into`."""
+        if format.encoding.codec == "gif" or not views.are_stated(format.facts):
+            return begin(self.container, format)
+        self._into = views.stream_after(self.container, sample_of(format), format.facts)
+        self._into.time_base = format.base
+        name_codec(self._into, format.encoding)
+        self._source = av.open(io.BytesIO(), "w", format="matroska")
+        stream = begin(self._source, format)
+        # Matroska's form of it would say that packets have Matroska's form, too.
+        self._into.codec_context.extradata = stream.codec_context.extradata
+        return stream
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
         """Write what can be written once `frame`, of the encoder's format, is there."""
@@ -146,6 +169,8 @@ class VideoFile(NewFile):
             packets = self._stream.encode(frame)
         except (FFmpegError, OSError) as error:
             raise atomic.about(self.path, error) from None
+        for packet in packets if self._into is not None else ():
+            packet.stream = self._into
         self.mux(self._timed(packets))
 
     def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
@@ -180,6 +205,24 @@ def begin(container: OutputContainer, format: VideoFormat) -> VideoStream:
     with kept_scheduling():
         context.open()
     return stream
+
+
+def sample_of(format: VideoFormat) -> bytes:
+    """One picture of a format, in Matroska; see views.stream_after."""
+    file = io.BytesIO()
+    with av.open(file, "w", format="matroska", container_options={"live": "1"}) as out:
+        stream = begin(out, format)
+        if mode := views.stereo_mode(format.facts):
+            stream.metadata["stereo_mode"] = mode
+        frame = av.VideoFrame(*format.padded, format.pixels)
+        for plane in frame.planes:
+            np.frombuffer(buffer(plane), np.uint8)[:] = 0
+        frame.pts, frame.time_base = 0, format.base
+        tag(frame, format.coding)
+        for packet in [*stream.encode(frame), *stream.encode(None)]:
+            packet.dts = packet.pts
+            out.mux_one(packet)
+    return file.getvalue()
 
 
 def name_codec(stream: VideoStream, encoding: Encoding) -> None:

@@ -41,6 +41,10 @@ class Facts:
     """Width of a pixel to its height."""
     mastering: Mastering | None = None
     light_level: LightLevel | None = None
+    projection: bytes | None = None
+    """FFmpeg's AVSphericalMapping: pictures are part of a sphere (360 degrees)."""
+    stereo: bytes | None = None
+    """FFmpeg's AVStereo3D: pictures hold two views."""
 
 
 NO_FACTS = Facts()
@@ -218,7 +222,8 @@ class Encoding:
         said = []
         if (facts.mastering or facts.light_level) and not self.encoder.parameters:
             said.append(f"{self.encoder.name} keeps no HDR10 data (mastering display, light level)")
-        if facts.pixel_aspect != 1 and self.suffix in (".mkv", ".webm") and not self.encoder.vui:
+        tells = self.encoder.vui and facts.stereo is None
+        if facts.pixel_aspect != 1 and self.suffix in (".mkv", ".webm") and not tells:
             said.append(
                 f"{self.codec} in {self.suffix} keeps no shape of pixels: these are "
                 f"{facts.pixel_aspect} times as wide as high"
@@ -252,7 +257,9 @@ class Encoding:
     def _lost(self, wanted: Coding, stored: Coding) -> list[str]:
         said = []
         if wanted.alpha and not stored.alpha:
-            said.append(f"{self.codec} holds no transparency: it is left out; prores and ffv1 do")
+            held = "wgmb writes no transparent GIF" if self.codec == "gif" else ""
+            held = held or f"{self.codec} holds no transparency"
+            said.append(f"{held}: it is left out; prores and ffv1 do")
         if wanted.bits > stored.bits:
             said.append(f"{self.codec} holds {stored.bits} bits of {wanted.bits}")
         coarser = any(a > b for a, b in zip(stored.steps, wanted.steps, strict=True))

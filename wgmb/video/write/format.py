@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ...color.coding import Coding
+from . import views
 from .encoders import NO_FACTS, Encoding, Facts
 
 
@@ -37,7 +38,8 @@ class VideoFormat:
     @property
     def left_out(self) -> list[str]:
         """Facts that the file cannot hold, in words."""
-        return self.encoding.left_out(self.facts)
+        of_views = views.left_out(self.facts, self.encoding.suffix)
+        return [*self.encoding.left_out(self.facts), *of_views]
 
     @property
     def padding(self) -> tuple[int, int]:

@@ -28,6 +28,7 @@ from ...color.coding import CodedPicture
 from ...errors import InputError
 from ...io import atomic, record
 from ..read.container import opened, picture_stream
+from . import views
 from .container import NewFile, name_codec
 from .format import VideoFormat
 from .other_streams import OtherStreams
@@ -71,6 +72,7 @@ class Segments:
             "rate": str(format.rate),
             "base": str(format.base),
             "pixel_aspect": str(format.facts.pixel_aspect),
+            "views": [(one or b"").hex() for one in (format.facts.projection, format.facts.stereo)],
             "encoders": {name: list(v) for name, v in av.library_versions.items()},
         }
 
@@ -95,6 +97,7 @@ class Segments:
         texts = others.metadata if others else {}
         temporary = atomic.temporary_name(self.path)
         file = NewFile(self.path, temporary, self._format.encoding.suffix, texts, record)
+        file.has_views = views.are_stated(self._format.facts)
         try:
             left_out = self._written(file, others)
             file.close()
