@@ -19,7 +19,7 @@ import make_clips as clips
 from soaking import stated
 from soaking.processes import apart
 from soaking.stated import videos
-from wgmb import InputError, allocator, threads
+from wgmb import InputError, allocator, blur_video, threads
 from wgmb.io import watch
 from wgmb.video.read import container
 from wgmb.video.read.reader import VideoReader
@@ -224,3 +224,17 @@ def test_a_reading_that_is_left_closes_its_file_itself(tmp_path, monkeypatch):
     while len(readers) < 2 and time.monotonic() < until:
         time.sleep(0.01)
     assert len(readers[1]) == 12
+
+
+def test_sound_whose_first_packet_is_too_large_is_left_out(tmp_path):
+    """FFmpeg has no memory for 2 GB: the pictures are blurred, and the damage is told."""
+    path = clips.write(tmp_path / "in.mp4", tone=0.2, muxing=FRAGMENTS)
+    data = bytearray(path.read_bytes())
+    runs = [inside for name, _, inside, _ in videos.boxes(bytes(data)) if name.endswith("/trun")]
+    for inside in runs[-1:]:  # of the sound, whose packets state their sizes
+        flags = int.from_bytes(data[inside + 1 : inside + 4], "big")
+        at = inside + 8 + 4 * bool(flags & 1) + 4 * bool(flags & 4) + 4 * bool(flags & 0x100)
+        data[at : at + 4] = (2**31 - 1).to_bytes(4, "big")
+    path.write_bytes(data)
+    blur_video(path, tmp_path / "out.mkv", flow="none")
+    assert len(VideoReader(tmp_path / "out.mkv")) == 12

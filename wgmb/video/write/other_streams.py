@@ -101,7 +101,7 @@ class OtherStreams:
             self._container.seek(int((self._clock.first - _BEFORE) * 1_000_000))
         wanted = [self._container.streams[index] for index in self._ways]
         self._packets = self._container.demux(wanted) if wanted else iter(())
-        self._next = next(self._packets, None)
+        self._next = self._following()
         return said
 
     def _is_of_chapters(self, stream: Stream) -> bool:
