@@ -17,10 +17,7 @@ def _leave(*_) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     interpreter.leave_current_folder()
-    import signal  # the first module that is searched for
-
-    signal.signal(signal.SIGINT, _leave)
-    signal.signal(signal.SIGTERM, _leave)
+    interpreter.handle_signals(_leave)
     try:
         from .cli.app import run
     except ImportError as error:

@@ -7,6 +7,10 @@ imports what is there before a folder is searched, and nothing else.
 import os
 import sys
 
+TYPE_CHECKING = False  # typing's own is not loaded here
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
 _ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
 
 
@@ -43,3 +47,19 @@ def _is_current(folder: str) -> bool:
         return place == os.path.realpath(os.curdir) != _ROOT
     except OSError:  # it was removed
         return not folder
+
+
+def handle_signals(handler: "Callable[..., object] | int") -> None:
+    """Set the handler of the signals that end a program.
+
+    They are Ctrl-C, SIGTERM, and SIGHUP, as a terminal sends that is closed. SIGHUP stays ignored
+    where nohup has it ignored; SIGINT does not, which a shell has ignored by what runs in the
+    background. ValueError on any but the main thread.
+    """
+    import signal  # by now, it is not searched for in the current folder
+
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        is_kept = name == "SIGHUP" and number and signal.getsignal(number) == signal.SIG_IGN
+        if number and not is_kept:
+            signal.signal(number, handler)

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 _Item = TypeVar("_Item")
 _POLL = 0.05  # seconds after which a thread looks whether it should stop
@@ -30,6 +30,29 @@ def begin(work: Callable[[], None], name: str) -> threading.Thread:
 def crew(count: int, name: str) -> ThreadPoolExecutor:
     """As many threads, for calls whose results are waited for."""
     return ThreadPoolExecutor(count, name)
+
+
+def within(seconds: float, call: Callable[[], _Item], name: str = "within") -> _Item:
+    """The result of a call, or its error, made in a thread of its own.
+
+    TimeoutError if it takes longer: it goes on alone then.
+    """
+    answers: queue.SimpleQueue[tuple[_Item | None, BaseException | None]] = queue.SimpleQueue()
+
+    def make() -> None:
+        try:
+            answers.put((call(), None))
+        except BaseException as error:  # raised in the caller's thread
+            answers.put((None, error))
+
+    begin(make, name)
+    try:
+        value, error = answers.get(timeout=seconds)
+    except queue.Empty:
+        raise TimeoutError(f"no answer in {seconds:g} s") from None
+    if error is not None:
+        raise error
+    return cast(_Item, value)
 
 
 def is_main() -> bool:

@@ -162,3 +162,14 @@ def test_what_a_half_made_object_raises_after_an_interruption_is_not_printed(cap
     monkeypatch.setattr(terminal.interrupted, "is_set", lambda: True)
     HalfMade()
     assert capsys.readouterr().err == ""
+
+
+def test_what_an_interruption_makes_of_an_error_is_an_interruption(capsys, monkeypatch):
+    """A terminal that is closed cannot be written to: OSError, for its progress bar."""
+
+    def broken(*_):
+        terminal.interrupted.set()
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(app, "make_app", broken)
+    assert app.main(["devices"]) == 130

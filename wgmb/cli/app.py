@@ -28,7 +28,8 @@ from ..errors import (
     meant_setting,
 )
 from ..extras import EXTRAS, reason
-from . import terminal
+from ..interpreter import handle_signals
+from . import interruption, terminal
 from .exit_codes import (
     DONE,
     INTERRUPTED,
@@ -105,16 +106,10 @@ def main(arguments: list[str] | None = None) -> int:
     terminal.interrupted.clear()
     words = named(sys.argv[1:] if arguments is None else arguments)
     try:
-        signal.signal(signal.SIGTERM, terminal.interrupt)
-        signal.signal(signal.SIGINT, terminal.interrupt)  # a shell may have set it to be ignored
+        handle_signals(terminal.interrupt)
         warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
         logging.getLogger().addHandler(logging.NullHandler())  # nor their logs
-        _check_text(words)
-        app = make_app(*words)
-        app.config = _config(words)
-        result = app(words, exit_on_error=False, print_error=False)
-        terminal.flush()
-        return result if isinstance(result, int) else DONE
+        return _command(words)
     except cyclopts.UnknownOptionError as error:
         why = _elsewhere(words, error) or _unknown(words, error)
         return _say_why(f"{why}{_hint(words)}", USAGE)
@@ -125,8 +120,6 @@ def main(arguments: list[str] | None = None) -> int:
     except Error as error:
         return _say_why(str(error), USAGE)
     except ImportError as error:
-        if terminal.interrupted.is_set():  # within the import of a module
-            return _say_why("interrupted", INTERRUPTED)
         cause = error.__cause__  # of a command's module that cannot be loaded
         own = words[0] if words[0] in {package.extra for package in EXTRAS.values()} else ""
         if not (why := reason(cause if isinstance(cause, ImportError) else error, own)):
@@ -141,9 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
         return _say_why("not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
         return _say_why("interrupted", INTERRUPTED)
-    except Exception as error:  # of a library that an interruption left half done
-        if terminal.interrupted.is_set():
-            return _say_why("interrupted", INTERRUPTED)
+    except Exception as error:
         if (why := _device_error(error)) is None:
             raise
         return _say_why(str(why), NO_DEVICE)
@@ -157,6 +148,21 @@ def _device_error(error: Exception) -> Error | None:
 
     ours = translated(error)
     return ours if isinstance(ours, Error) else None
+
+
+def _command(words: list[str]) -> int:
+    """Run a command; KeyboardInterrupt once it is interrupted, whatever it makes of that."""
+    try:
+        _check_text(words)
+        app = make_app(*words)
+        app.config = _config(words)
+        result = app(words, exit_on_error=False, print_error=False)
+        terminal.flush()
+    except Exception:  # of a library that was left half done, or of a terminal that is closed
+        terminal.check()
+        raise
+    terminal.check()  # a window's loop, which handles signals itself, just ends
+    return result if isinstance(result, int) else DONE
 
 
 def _check_text(words: list[str]) -> None:
@@ -278,11 +284,13 @@ def run(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     sys.unraisablehook = terminal.hush
     bound_free_memory()
+    interruption.watch()
     codes: list[int] = []
     atexit.register(_insist, codes)  # before all others, so it is called after them
     code = main(arguments)
-    for number in (signal.SIGTERM, signal.SIGINT):  # nothing is left to be interrupted
-        signal.signal(number, lambda *_: os._exit(code))
+    if code == INTERRUPTED:
+        interruption.finish()
+    handle_signals(lambda *_: os._exit(code))  # nothing is left to be interrupted
     terminal.drop_streams()
     codes.append(code)
     sys.exit(code)
@@ -295,7 +303,6 @@ def _insist(codes: list[int]) -> None:
     would end the process by SIGINT, although the exception was caught. And Python gives up its
     handlers of signals before it has ended.
     """
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, signal.SIG_IGN)
+    handle_signals(signal.SIG_IGN)
     if codes == [INTERRUPTED]:
         os._exit(INTERRUPTED)

@@ -16,6 +16,8 @@ import socket
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+from . import leftovers
+
 Buffer = bytes | memoryview
 
 try:
@@ -42,10 +44,10 @@ def write_file(path: Path, *pieces: Buffer, temporary: Path | None = None) -> No
             os.fsync(file.fileno())
         rename(temporary, path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        remove(temporary)
         raise about(path, error) from None
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        remove(temporary)
         raise
 
 
@@ -71,11 +73,22 @@ def create(temporary: Path) -> int:
     """
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
     flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-    descriptor = os.open(temporary, flags, 0o666)
+    leftovers.add(temporary, lambda: temporary.unlink(missing_ok=True))
+    try:
+        descriptor = os.open(temporary, flags, 0o666)
+    except BaseException:  # what is there is not ours
+        leftovers.forget(temporary)
+        raise
     if fcntl is not None:
         with contextlib.suppress(OSError):  # a file system without locks
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     return descriptor
+
+
+def remove(temporary: Path) -> None:
+    """Remove a file that `create` made, if it is still there."""
+    temporary.unlink(missing_ok=True)
+    leftovers.forget(temporary)
 
 
 def rename(temporary: Path, path: Path, *, is_new: bool = False) -> None:
@@ -86,6 +99,7 @@ def rename(temporary: Path, path: Path, *, is_new: bool = False) -> None:
     if is_new and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, "was written by another process during this run")
     os.replace(temporary, path)
+    leftovers.forget(temporary)
     if os.name == "nt":  # folders cannot be opened there
         return
     with contextlib.suppress(OSError):  # a folder that may be written but not read

@@ -257,7 +257,9 @@ def _open(path: Path, *, header_only: bool):
     options = {"separate_channels": True, "header_only": header_only}
     try:
         try:
-            return OpenEXR.File(str(path), **options), set()
+            # Of a stream, the library lets other threads run while the disk is waited for.
+            with open(path, "rb") as file:
+                return OpenEXR.File(file, **options), set()
         except ZeroDivisionError:
             stream, unknown = exr_headers.with_rationals(path)
             return OpenEXR.File(stream, **options), unknown

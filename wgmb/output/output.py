@@ -319,7 +319,7 @@ class Output:
         for one in self._videos.values():
             one.abandon()
         if self._under_way is not None:
-            self._under_way.unlink(missing_ok=True)
+            atomic.remove(self._under_way)
 
 
 def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:

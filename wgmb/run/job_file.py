@@ -183,7 +183,7 @@ def time_there(folder: Path) -> int:
         os.close(atomic.create(probe))
         return probe.stat().st_mtime_ns
     finally:
-        probe.unlink(missing_ok=True)
+        atomic.remove(probe)
 
 
 def anchored(request: BlurRequest, folder: Path) -> BlurRequest:

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from .. import interpreter
 from ..color.srgb import linear
 from ..errors import Error, InputError
-from ..io import exr, stills
+from ..io import exr, leftovers, stills
 from ..io.atomic import temporary_name, write_file
 from ..io.record import KEY
 from ..video.write.frames import FrameVideo
@@ -136,6 +136,7 @@ class Actions:
             stderr=subprocess.PIPE,
             text=True,
         )
+        leftovers.add("export", lambda: _end(child))
         self.export, self.export_message = (child, output), f"exporting {output} ..."
 
     def poll_export(self) -> None:
@@ -143,6 +144,7 @@ class Actions:
         if self.export is None or self.export[0].poll() is None:
             return
         (child, output), self.export = self.export, None
+        leftovers.forget("export")
         said = (child.communicate()[1] or "").strip().splitlines()
         self.export_message = f"exported {output}" if child.returncode == 0 else " ".join(said[-1:])
 
@@ -159,6 +161,12 @@ class Actions:
         if monitor is not None:
             mode = glfw.get_video_mode(monitor)
             glfw.set_window_monitor(window, monitor, 0, 0, *mode.size, mode.refresh_rate)
+
+
+def _end(child: subprocess.Popen) -> None:
+    """Have an export leave nothing behind, and end."""
+    child.terminate()
+    child.wait()
 
 
 def _free(*suffixes: str) -> Path:

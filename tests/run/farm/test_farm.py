@@ -3,6 +3,8 @@
 import contextlib
 import os
 import signal
+import socket
+import ssl
 import subprocess
 import sys
 import time
@@ -10,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import farm_stubs
+import psutil
 import pytest
 from make_job import job_of
 
@@ -18,6 +21,7 @@ from wgmb import DeviceError, gpu
 from wgmb.extras import install_command
 from wgmb.run.farm import farm as farming
 from wgmb.run.farm.farm import Farm, as_farm_job
+from wgmb.run.farm.local import local_client
 from wgmb.run.farm.workers import hardware_adapters
 
 COUNT = 12
@@ -121,8 +125,6 @@ def test_nobody_else_gives_local_workers_something_to_do():
     """Whoever reaches a scheduler can run code in it, and ports are reached by all users."""
     from distributed import Client
 
-    from wgmb.run.farm.local import local_client
-
     with local_client(1) as client:
         address = client.scheduler.address
         assert address.startswith("tls://127.0.0.1:")
@@ -130,6 +132,64 @@ def test_nobody_else_gives_local_workers_something_to_do():
         for other in (address, address.replace("tls", "tcp")):
             with pytest.raises((OSError, TypeError)):
                 Client(other, timeout=2, set_as_default=False)
+
+
+def listening(process: int) -> dict[int, set[str]]:
+    """Ports at which a process and its descendants listen, and by which addresses."""
+    found: dict[int, set[str]] = {}
+    first = psutil.Process(process)
+    for one in (first, *first.children(recursive=True)):
+        for connection in one.net_connections("inet"):
+            if connection.status == psutil.CONN_LISTEN:
+                found.setdefault(connection.laddr.port, set()).add(connection.laddr.ip)
+    return found
+
+
+@DASK_LEAVES_SOCKETS
+def test_no_port_of_a_run_answers_whoever_does_not_have_its_keys():
+    """Every port of its processes is asked, in the ways of HTTP, of TLS, and of dask."""
+    before = listening(os.getpid())
+    with local_client(2) as client:
+        assert client.submit(int, "7").result(timeout=60) == 7
+        ports = {p: a for p, a in listening(os.getpid()).items() if p not in before}
+        assert len(ports) == 5  # the scheduler, and each worker with its nanny
+        assert set().union(*ports.values()) == {"127.0.0.1"}
+        for port in ports:
+            for path in ("/", "/health", "/json/identity.json", "/info/main/workers.html"):
+                said = answer(port, f"GET {path} HTTP/1.1\r\nHost: a\r\n\r\n".encode())
+                assert said == b"" or is_alert(said)
+            said = answer(port, bytes(64))
+            assert said == b"" or is_alert(said)
+            with pytest.raises((OSError, ssl.SSLError)):
+                stranger(port)
+
+
+def answer(port: int, data: bytes) -> bytes:
+    """The answer of a port to these bytes, in a second."""
+    with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
+        connection.settimeout(1)
+        with contextlib.suppress(OSError):
+            connection.sendall(data)
+            return connection.recv(4096)
+    return b""
+
+
+def is_alert(data: bytes) -> bool:
+    """Return True for what TLS says to what is no TLS: an alert, which tells nothing else."""
+    return len(data) == 7 and data[0] == 21
+
+
+def stranger(port: int) -> None:
+    """Ask by TLS, without a key of the run; OSError if there is no answer."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    with (
+        socket.create_connection(("127.0.0.1", port), timeout=5) as plain,
+        context.wrap_socket(plain) as connection,
+    ):
+        connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        if not connection.recv(4096):
+            raise OSError("closed")
 
 
 @DASK_LEAVES_SOCKETS
@@ -274,9 +334,10 @@ def test_senseless_words_are_one_line(shot, tmp_path, capsys, monkeypatch, more,
 
 def test_without_distributed_one_line_says_what_to_install(shot, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    code, _, err = make.inside(capsys, *words(shot, tmp_path, "--workers", 2))
+    code, _, err = make.inside(capsys, *words(shot, tmp_path / "out", "--workers", 2))
     assert code == 2
     assert err == (
         "wgmb: --workers and --cluster: dask.distributed is not installed: "
         f"{install_command('cluster')}\n"
     )
+    assert not (tmp_path / "out").exists()

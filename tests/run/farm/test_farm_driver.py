@@ -2,12 +2,15 @@
 
 import collections
 import pickle
+import threading
+import time
 
 import pytest
 from make_job import job_of
 
 import make_frames as make
 from wgmb import BatchReport, DeviceError, InputError
+from wgmb.io.frame_numbers import frame_list
 from wgmb.run.farm import driver as farm_driver
 from wgmb.run.farm import merge
 from wgmb.run.farm.driver import Driver
@@ -38,6 +41,13 @@ class Future:
 
     exception = result
 
+    def end(self):
+        self.status = "finished"
+        self.told(self)
+
+    def cancel(self):
+        pass
+
     def release(self):
         self.released = True
 
@@ -52,6 +62,7 @@ class Client:
 
     def __init__(self, states: dict[str, WorkerState | BaseException], behave):
         self.states, self._behave, self.status = dict(states), behave, "running"
+        self.signs: dict[str, float] = {}  # of workers that are silent, the last one
         self.given: list[tuple[str, list[int]]] = []
         self._born = collections.Counter()
 
@@ -62,7 +73,8 @@ class Client:
         pass
 
     def run_on_scheduler(self, function):
-        return list(self.states)
+        now = time.monotonic()
+        return {address: self.signs.get(address, now) for address in self.states}
 
     def run(self, function, *_, workers=(), **__):
         return {address: self.states.get(address) for address in workers}
@@ -82,6 +94,15 @@ class Client:
             self.states[address] = OSError("connection refused")
             self.states[address + "#1"] = GOOD
             return LostResult("finished", None)
+        if found == "silent":
+            self.signs[address] = time.monotonic()
+            return Future("pending", None)
+        if found == "waits":
+            return Future("pending", None)
+        if found == "slow":
+            future = Future("pending", well(chosen))
+            threading.Timer(0.3, future.end).start()
+            return future
         if found == "gone":
             self.status = "connecting"
             return Future("cancelled", None)
@@ -264,6 +285,75 @@ def test_a_scheduler_that_is_gone_is_one_reason(drive):
     assert report.stopped.startswith("the scheduler is gone")
     assert report.done == [1, 2, 3, 4]
     assert report.rest == 8
+
+
+def test_a_worker_that_is_silent_is_lost_and_its_frames_are_done_by_others(drive):
+    """As one is that was stopped: its process says nothing, and ends nothing."""
+
+    def behave(name, chosen):
+        return "silent" if name == "b" else well(chosen)
+
+    report, client, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert (report.done, report.failed) == (list(range(1, COUNT + 1)), {})
+    assert [name for name, _ in client.given].count("b") == 1
+    assert not notes
+
+
+def test_a_worker_that_speaks_again_is_asked_again(shot, tmp_path, monkeypatch):
+    driver = Driver(Farm("tcp://x"), Client({}, None), job_of(shot, tmp_path), "", print)
+    now = [0.0]
+    monkeypatch.setattr(farm_driver.time, "monotonic", lambda: now[0])
+    for seconds, sign, is_there in ((1, 5.0, True), (59, 5.0, True), (62, 5.0, False),
+                                    (63, 5.0, False), (64, 6.0, True)):  # fmt: skip
+        now[0] = seconds
+        driver._hear("b", sign)
+        assert ("b" in driver._workers) == is_there
+    assert driver._workers["b"].why_not is None
+
+
+def test_a_part_that_never_ends_is_given_to_another_worker_and_the_first_result_counts(
+    drive, monkeypatch
+):
+    """Its process speaks: it waits for a disk, say."""
+    monkeypatch.setattr(farm_driver, "LATE", 0.1)
+
+    def behave(name, chosen):
+        return "waits" if name == "b" else well(chosen)
+
+    report, client, notes, ticks = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert (report.done, report.failed) == (list(range(1, COUNT + 1)), {})
+    assert sorted(n for n, _ in ticks) == report.done
+    (part,) = [chosen for name, chosen in client.given if name == "b"]
+    assert ("a", part) in client.given
+    assert notes == [f"worker 1 on there does nothing: it does not end frames {frame_list(part)}"]
+
+
+def test_a_part_that_takes_long_is_left_to_its_worker_while_none_has_ended(drive, monkeypatch):
+    monkeypatch.setattr(farm_driver, "LATE", 0.0)
+    monkeypatch.setattr(farm_driver, "TIMES_LATE", 100)
+    states = {"a": GOOD, "b": WorkerState("1", "there", 2)}
+    report, client, notes, _ = drive(states, lambda name, chosen: "slow", patience=5)
+    assert report.done == list(range(1, COUNT + 1))
+    assert len(client.given) == 3
+    assert not notes
+
+
+@pytest.mark.parametrize("silent", ["run_on_scheduler", "run"])
+def test_an_interruption_does_not_wait_for_workers(shot, tmp_path, monkeypatch, silent):
+    """Those of a cluster are told to stop; one that does not answer is left behind."""
+    monkeypatch.setattr(farm_driver, "_END", 0.2)
+
+    def check():
+        if client.given:
+            setattr(client, silent, lambda *_, **__: time.sleep(60))
+            raise KeyboardInterrupt
+
+    client = Client({"a": GOOD}, lambda name, chosen: "waits")
+    place = Farm("tcp://x", check=check)
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        Driver(place, client, job_of(shot, tmp_path), "", lambda n, state: None).run()
+    assert time.monotonic() < begun + 5
 
 
 @pytest.mark.fast

@@ -236,12 +236,12 @@ def blur_on_farm(
 
     for text in () if quiet else job.remarks:
         note(as_options(text))
-    job = as_farm_job(job)
 
     def say(text: str) -> None:
         note(as_options(text))
 
     farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None, check)
+    job = as_farm_job(job)
     started = time.perf_counter()
     with progress(len(job.numbers), quiet) as tick, muted():
         report = farm.blur(job, tick)

@@ -20,11 +20,14 @@ import numpy as np
 from ...errors import DeviceError, Error, InputError
 from ...io.frame_numbers import frame_list
 from ...sequence.findings import ranges
+from ...threads import within
 from ..engine import ON_REQUEST
 from ..job import Job
 from ..report import BatchReport, Progress, describe_input
-from . import merge
+from . import local, merge
 from .workers import (
+    LATE,
+    TIMES_LATE,
     Chunk,
     Worker,
     WorkerPool,
@@ -32,6 +35,8 @@ from .workers import (
 )
 
 _LOOK = 0.5  # seconds after which the driver looks who is there
+_ANSWER = 10.0  # seconds in which a worker that runs answers a question
+_END = 1.5  # seconds in which workers end the frames that they are at, after an interruption
 _TWICE = "its worker died twice"
 _GONE = "the scheduler is gone; start it and its workers again, and go on with `resume=True`"
 
@@ -49,6 +54,8 @@ class Driver:
         adapters = farm.adapters() if embedded else [farm.adapter] if farm.adapter else []
         make = farm.plugin or BlurPlugin
         self._plugin = make(self._id, text, adapters, embedded)
+        self._silent: dict[str, float] = {}  # workers that are lost, with their last sign of life
+        self._slowest = 0.0  # seconds of a part
         self._events: queue.SimpleQueue[tuple[str, Any]] = queue.SimpleQueue()
         self._workers: dict[str, Worker] = {}
         self._named: set[tuple[str, str]] = set()
@@ -68,7 +75,10 @@ class Driver:
         try:
             client.subscribe_topic(self._topic, lambda event: self._events.put(("told", event[1])))
             with contextlib.suppress(Exception):  # each worker is asked how it went
-                client.register_plugin(self._plugin, name=self._topic)
+                within(
+                    self._farm.patience,
+                    lambda: client.register_plugin(self._plugin, name=self._topic),
+                )
             self._go_on()
         except (KeyboardInterrupt, SystemExit):
             self._end()
@@ -111,34 +121,70 @@ class Driver:
         if time.monotonic() < self._looked + _LOOK:
             return
         self._looked = time.monotonic()
-        there = self._answer(self._client.run_on_scheduler, plugin.addresses)
+        there = self._answer(
+            self._farm.patience, lambda: self._client.run_on_scheduler(plugin.signs_of_life)
+        )
+        if there is None:
+            raise _LostError
         for address in [a for a in self._workers if a not in there]:
-            self._gone(self._workers.pop(address))
-        for address in there:
-            self._workers.setdefault(address, Worker(address))
-        unknown = [w for w in self._workers.values() if w.why_not is None]
+            self._gone(self._workers.pop(address), "died")
+        for address, sign in there.items():
+            self._hear(address, sign)
+        unknown = [w for w in self._workers.values() if w.why_not is None and self._speaks(w)]
         if unknown:
             states = self._answer(
-                self._client.run,
-                plugin.state_of,
-                self._id,
-                workers=[w.address for w in unknown],
-                on_error="return",
+                _ANSWER,
+                lambda: self._client.run(
+                    plugin.state_of,
+                    self._id,
+                    workers=[w.address for w in unknown],
+                    on_error="return",
+                ),
             )
             for worker in unknown:
-                self._learn(worker, states.get(worker.address))
+                self._learn(worker, (states or {}).get(worker.address))
 
-    def _answer(self, ask: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        """An answer of the scheduler or of workers; _LostError where there is none."""
-        try:
-            return ask(*arguments, **named)
-        except (OSError, RuntimeError, ValueError):
+    def _hear(self, address: str, sign: float) -> None:
+        """Take note of a worker that is listed; one that is silent for too long is lost."""
+        if self._silent.get(address) == sign:
+            return
+        self._silent.pop(address, None)
+        worker = self._workers.setdefault(address, Worker(address))
+        now = time.monotonic()
+        if worker.sign != sign:
+            worker.sign, worker.heard = sign, now
+        elif now > worker.heard + self._farm.patience:
+            self._silent[address] = sign
+            self._kill(self._workers.pop(address))
+            self._gone(worker, f"has not been heard of for {self._farm.patience:g} s")
+
+    def _speaks(self, worker: Worker) -> bool:
+        """Return True if a worker has given a sign of life just now."""
+        return time.monotonic() < worker.heard + _ANSWER
+
+    def _kill(self, worker: Worker) -> None:
+        """End a process of this run that does nothing any more; another one takes its place."""
+        if self._farm.cluster is None:
+            with contextlib.suppress(Exception):
+                local.kill(self._client.cluster, worker.address)
+
+    def _answer(self, seconds: float, ask: Callable[[], Any]) -> Any:
+        """An answer of the scheduler or of workers, None where they are silent for so long.
+
+        _LostError where the scheduler is gone.
+        """
+        for attempt in (1, 2):
             if self._client.status != "running":
                 raise _LostError from None
-            time.sleep(_LOOK)
-            if self._client.status != "running":
-                raise _LostError from None
-            return ask(*arguments, **named)
+            try:
+                return within(seconds, ask)
+            except TimeoutError:
+                return None
+            except (OSError, RuntimeError, ValueError):
+                if attempt == 2:
+                    raise
+                time.sleep(_LOOK)
+        return None
 
     def _learn(self, worker: Worker, state: Any) -> None:
         if state is None or isinstance(state, (OSError, TimeoutError)):
@@ -160,7 +206,8 @@ class Driver:
             where = f" on {worker.host}" if worker.host else ""
             self._farm.note(f"worker {worker.name}{where} does nothing: {why}")
 
-    def _gone(self, worker: Worker) -> None:
+    def _gone(self, worker: Worker, how: str) -> None:
+        """A worker died, or is lost: its part is given to others."""
         part, worker.part = worker.part, None
         if worker.future is not None:
             worker.future.release()
@@ -168,7 +215,9 @@ class Driver:
             return
         self._deaths += 1
         part.deaths += 1
-        self._farm.details(f"worker {worker.name} died at {frame_list(part.numbers)}")
+        self._farm.details(f"worker {worker.name} {how} at {frame_list(part.numbers)}")
+        if self._holders(part):
+            return
         if part.deaths < 2:
             self._parts.appendleft(part)
         elif len(part.numbers) > 1:
@@ -210,6 +259,39 @@ class Driver:
                     del self._parts[i]
                     self._hand_over(worker, part)
                     break
+            else:
+                self._help(worker)
+
+    def _help(self, worker: Worker) -> None:
+        """Give a worker that has nothing to do the part that another one does not end.
+
+        Whoever ends it first is the one that counts.
+        """
+        late = time.monotonic() - max(LATE, TIMES_LATE * self._slowest)
+        for other in self._workers.values():
+            if (part := other.part) is None or other.since > late or not self._slowest:
+                continue
+            if len(self._holders(part)) == 1 and worker.address not in part.refused_by:
+                self._farm.details(f"worker {other.name} does not end {frame_list(part.numbers)}")
+                self._hand_over(worker, part)
+                return
+
+    def _holders(self, part: Chunk) -> list[Worker]:
+        """The workers that have a part."""
+        return [worker for worker in self._workers.values() if worker.part is part]
+
+    def _release(self, part: Chunk, since: float) -> None:
+        """A part is done: other workers that have it, too, need not end it.
+
+        One that was given it earlier hangs, and is given nothing more.
+        """
+        for worker in self._holders(part):
+            worker.part = None
+            worker.future.release()
+            if worker.since < since:
+                worker.why_not = f"it does not end frames {frame_list(part.numbers)}"
+                self._refuse(worker, False)
+                self._kill(worker)
 
     def _divide(self, workers: int) -> None:
         numbers = self._job.numbers
@@ -221,7 +303,7 @@ class Driver:
         from .plugin import blur_part
 
         self._tasks += 1
-        worker.part = part
+        worker.part, worker.since = part, time.monotonic()
         worker.future = future = self._client.submit(
             blur_part,
             self._id,
@@ -244,6 +326,8 @@ class Driver:
             return  # it was given up
         part, worker.part, worker.future = worker.part, None, None
         if future.status == "finished":
+            self._slowest = max(self._slowest, time.monotonic() - worker.since)
+            self._release(part, worker.since)
             try:
                 self._took(worker, part, future.result(timeout=30))
             except (OSError, TimeoutError):  # it died with its result
@@ -258,7 +342,7 @@ class Driver:
         """A worker died before the scheduler noticed; given another part, it would die twice."""
         del self._workers[worker.address]
         worker.part = part
-        self._gone(worker)
+        self._gone(worker, "died")
 
     def _took(self, worker: Worker, part: Chunk, report: BatchReport) -> None:
         worker.faults = 0
@@ -282,6 +366,8 @@ class Driver:
 
     def _fault(self, worker: Worker, part: Chunk, error: BaseException | None) -> None:
         """The part could not even be begun."""
+        if self._holders(part):
+            return
         why = str(error) if isinstance(error, Error) else f"{type(error).__name__}: {error}"
         why = " ".join(why.split())
         is_second = bool(part.refused_by)
@@ -314,17 +400,22 @@ class Driver:
                 self._heard(*self._events.get_nowait())
 
     def _end(self) -> None:
-        """After an interruption: every worker ends the frame that it is at."""
+        """After an interruption: every worker ends the frame that it is at, if it does so soon."""
         from . import plugin
 
         with contextlib.suppress(Exception):
             for worker in self._workers.values():
                 if worker.future is not None:
                     worker.future.cancel()
-            self._client.run(plugin.end, self._id, on_error="ignore")
-            self._tidy()
+            try:
+                within(_END, lambda: self._client.run(plugin.end, self._id, on_error="ignore"))
+            except TimeoutError:
+                if self._farm.cluster is None:
+                    local.kill(self._client.cluster)
+            self._deaths += 1  # the same signal may have ended workers
+            self._tidy(_END)
 
-    def _tidy(self) -> None:
+    def _tidy(self, seconds: float = _ANSWER) -> None:
         """Remove what killed workers left, by a worker of each host; and the plugin."""
         from . import plugin
 
@@ -336,12 +427,15 @@ class Driver:
         hosts.pop(here, None)
         with contextlib.suppress(Exception):
             if self._deaths and hosts:
-                self._client.run(
-                    plugin.sweep, self._id, workers=list(hosts.values()), on_error="ignore"
+                within(
+                    seconds,
+                    lambda: self._client.run(
+                        plugin.sweep, self._id, workers=list(hosts.values()), on_error="ignore"
+                    ),
                 )
         with contextlib.suppress(Exception):
             if self._farm.cluster is not None:
-                self._client.unregister_worker_plugin(self._topic)
+                within(seconds, lambda: self._client.unregister_worker_plugin(self._topic))
 
 
 class _LostError(Exception):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...extras import needed_by
+from ...io import leftovers
 from ..job import Job
 from ..job_file import stored, time_there
 from ..report import BatchReport, Progress
@@ -20,8 +21,14 @@ from .workers import SMALLEST, WorkerPool, hardware_adapters
 _CONNECT = 10  # seconds to reach a scheduler
 
 
+@dataclass
 class Farm(WorkerPool):
-    """A Place whose workers blur jobs."""
+    """A Place whose workers blur jobs; InputError where dask.distributed is missing."""
+
+    def __post_init__(self) -> None:
+        with needed_by("`workers` and `cluster`"):
+            import cryptography  # noqa: F401
+            import distributed  # noqa: F401
 
     def blur(self, job: Job, progress: Progress | None = None) -> BatchReport:
         """Blur all frames of a job; its output has been looked at.
@@ -30,8 +37,7 @@ class Farm(WorkerPool):
         worker ends the frame that it is at, and the interruption goes on.
         """
         text = stored(job, SMALLEST, frames=job.numbers[:1]).text()
-        _need_distributed()
-        with self._client() as client:
+        with leftovers.removed_by(job.sweep), self._client() as client:
             return Driver(self, client, job, text, progress or (lambda n, state: None)).run()
 
     @contextlib.contextmanager
@@ -59,9 +65,3 @@ def as_farm_job(job: Job) -> Job:
     if output.overwrite and not output.resume and job.since is None:
         return replace(job, since=time_there(Path(output.output).parent))
     return job
-
-
-def _need_distributed() -> None:
-    with needed_by("`workers` and `cluster`"):
-        import cryptography  # noqa: F401
-        import distributed  # noqa: F401

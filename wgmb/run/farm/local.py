@@ -14,11 +14,14 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing.util import get_temp_dir
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from ... import interpreter
 from ...errors import DeviceError
+from ...io import leftovers
 
 _NEVER = "1 hour"
 _QUIET: dict[str, Any] = {
@@ -30,6 +33,9 @@ _QUIET: dict[str, Any] = {
     "distributed.scheduler.work-stealing": False,
     "distributed.scheduler.active-memory-manager.start": False,
     "distributed.diagnostics.nvml": False,
+    # Pages for browsers.
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
     # Logs of messages, for each worker.
     "distributed.admin.low-level-log-length": 20,
     "distributed.diagnostics.computations.max-history": 1,
@@ -40,8 +46,9 @@ _QUIET: dict[str, Any] = {
     # A machine that is busy with starting many workers answers late.
     "distributed.comm.timeouts.connect": "1 minute",
 }
-_LOADED_ONCE = ["distributed", "wgpu.backends.wgpu_native", "wgmb.run.farm.plugin"]
+_LOADED_ONCE = ["wgpu.backends.wgpu_native", "wgmb.run.farm.preloaded"]
 _CLOSING = 5.0  # seconds
+_KILLING = 0.4  # seconds until a killed process is gone
 _STARTING = 20.0  # seconds, after all processes have begun
 _LOOKING = 0.3  # seconds between two looks at whether one is lost
 _MOST_LOST = 3  # for each worker, until the run is given up
@@ -51,31 +58,31 @@ _MOST_LOST = 3  # for each worker, until the run is given up
 def local_client(count: int) -> Iterator[Any]:
     """A client of `count` new workers of one thread each; they end with it."""
     import dask.config
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     from .encryption import Encryption
+    from .processes import cluster_of
 
     method = "forkserver" if sys.platform.startswith("linux") else "spawn"
     settings = {**_QUIET, "distributed.worker.multiprocessing-method": method}
     with (
         TemporaryDirectory(prefix="wgmb-", ignore_cleanup_errors=True) as folder,
-        dask.config.set(settings),
+        leftovers.removed_by(lambda: _remove(folder)),
+        dask.config.set({**settings, "temporary-directory": folder}),
         _environment(),
     ):
         if method == "forkserver":
             _load_once()
-        cluster = LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",
-            silence_logs=50,
-            memory_limit=0,
-            host="tls://127.0.0.1",
-            security=Encryption.temporary(),
-            local_directory=folder,
+        cluster = cluster_of(
+            count,
+            Encryption.temporary(),
             env=dict(os.environ),  # that of the first process that loaded modules may be older
         )
-        with closing(cluster), closing(Client(cluster, set_as_default=False)) as client:
+        with (
+            closing(cluster),
+            leftovers.removed_by(lambda: kill(cluster)),
+            closing(Client(cluster, set_as_default=False)) as client,
+        ):
             _wait_for(cluster, client, count)
             yield client
 
@@ -102,6 +109,28 @@ def _load_once() -> None:
     from distributed.utils import get_mp_context
 
     get_mp_context().set_forkserver_preload(_LOADED_ONCE)
+
+
+def kill(cluster: Any, address: str | None = None) -> None:
+    """End the process of the worker at an address, or of all, whatever they are doing.
+
+    The cluster starts another one in its place, unless it is closed.
+    """
+    import psutil
+
+    nannies = [n for n in cluster.workers.values() if address in (None, n.worker_address)]
+    processes = []
+    for number in filter(None, (nanny.pid for nanny in nannies)):
+        with suppress(psutil.Error):
+            processes.append(psutil.Process(number))
+            processes[-1].kill()
+    psutil.wait_procs(processes, timeout=_KILLING)
+
+
+def _remove(folder: str) -> None:
+    """Remove the folder of a run's workers, and that of their process's connection."""
+    for place in (folder, get_temp_dir()):
+        rmtree(place, ignore_errors=True)
 
 
 @contextmanager

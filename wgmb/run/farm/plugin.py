@@ -16,6 +16,7 @@ from typing import Any
 
 from distributed import Worker, WorkerPlugin, get_worker
 
+from ... import interpreter
 from ..._version import __version__
 from ...errors import DeviceError, Error
 from ...sequence.findings import Range, numbers
@@ -60,7 +61,7 @@ class BlurPlugin(WorkerPlugin):
     async def setup(self, worker: Worker) -> None:
         """Called by the worker; it may open a device as long as it likes."""
         if self.is_embedded and is_main():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the driver tells when to stop
+            interpreter.handle_signals(signal.SIG_IGN)  # the driver tells when to stop
         self._worker, self._stop, self._idle = worker, Stop(), Stop()
         self._idle.set()
         adapter = None
@@ -154,6 +155,6 @@ def sweep(run: str, dask_worker: Worker) -> None:
     _plugin(dask_worker, run).sweep()
 
 
-def addresses(dask_scheduler: Any) -> list[str]:
-    """All workers there are."""
-    return list(dask_scheduler.workers)
+def signs_of_life(dask_scheduler: Any) -> dict[str, float]:
+    """All workers there are, by address, with the scheduler's time of their last message."""
+    return {address: one.last_seen for address, one in dask_scheduler.workers.items()}

@@ -12,7 +12,10 @@ from ... import gpu
 SMALLEST, LARGEST = 4, 64  # frames of a part
 _PARTS_EACH = 4  # parts that a worker does, at least, so that all end at about the same time
 PATIENCE = 60.0
-"""Seconds that a run waits for a worker that can do something."""
+"""Seconds that a run waits for a worker that can do something, or for a sign of life of one."""
+LATE = 300.0
+"""Seconds that frames may take in any case, before another worker is given them too."""
+TIMES_LATE = 10  # as long as the slowest part that has ended
 
 
 @dataclass
@@ -55,10 +58,13 @@ class Worker:
     """A worker as the driver sees it."""
 
     address: str
+    sign: float = 0.0  # of life, the last one; see `signs_of_life`
+    heard: float = 0.0  # when it changed [s, monotonic]
     name: str = ""
     host: str = ""
     why_not: str | None = None  # "": it can work; None: it is not known yet
     part: Chunk | None = None
+    since: float = 0.0  # when it was given its part [s, monotonic]
     future: Any = None
     faults: int = 0
 

@@ -58,7 +58,7 @@ class NewFile:
             kind = CONTAINERS[suffix]
             options = options | _MUXING.get(kind, {})
             self._container = av.open(
-                f"file:{temporary}", "w", format=kind, container_options=options
+                _Disk(self._lock), "w", format=kind, container_options=options
             )
         except (FFmpegError, OSError) as error:
             self.abandon()
@@ -117,7 +117,34 @@ class NewFile:
                 container.close()
         if self._lock is not None:
             self._unlock()
-            self.temporary.unlink(missing_ok=True)
+            atomic.remove(self.temporary)
+
+
+class _Disk:
+    """A file that FFmpeg writes through Python, which lets other threads run meanwhile.
+
+    Writing by itself, it keeps Python's lock: no signal is heard while a disk does not answer.
+    """
+
+    name = "file"
+
+    def __init__(self, descriptor: int):
+        self._descriptor = descriptor
+
+    def write(self, data: bytes) -> int:
+        """Write all of it."""
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(self._descriptor, rest) :]
+        return len(data)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place; returns it."""
+        return os.lseek(self._descriptor, offset, whence)
+
+    def tell(self) -> int:
+        """Return the place."""
+        return self.seek(0, os.SEEK_CUR)
 
 
 class VideoFile(NewFile):

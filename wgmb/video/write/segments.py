@@ -26,7 +26,7 @@ from av.video.stream import VideoStream
 
 from ...color.coding import CodedPicture
 from ...errors import InputError
-from ...io import atomic, record
+from ...io import atomic, leftovers, record
 from ..read.container import opened, picture_stream
 from . import views
 from .container import NewFile, name_codec
@@ -179,6 +179,7 @@ class Segments:
             for _ in range(3):  # another run may remove it meanwhile
                 if self.folder.is_symlink():
                     raise InputError(f"{self.folder}: is a link; it must be a folder")
+                leftovers.add(self.folder, self.folder.rmdir)  # if there is nothing in it
                 self.folder.mkdir(exist_ok=True)
                 temporary = atomic.temporary_name(self.folder / _CLAIM)
                 with contextlib.suppress(FileNotFoundError):
@@ -192,10 +193,11 @@ class Segments:
         """Let others remove the segments."""
         if self._claim is not None:
             (temporary, lock), self._claim = self._claim, None
-            temporary.unlink(missing_ok=True)
+            atomic.remove(temporary)
             os.close(lock)
             with contextlib.suppress(OSError):  # unless there are segments in it
                 self.folder.rmdir()
+            leftovers.forget(self.folder)
 
     def clear(self) -> None:
         """Remove the segments and their folder, unless others use it."""

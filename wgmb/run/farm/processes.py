@@ -1,0 +1,48 @@
+"""The scheduler and the workers of a run on this machine, whose ports answer no HTTP."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from distributed import Nanny, Scheduler, SpecCluster, Worker
+
+_HOST: dict[str, Any] = {"host": "tls://127.0.0.1", "protocol": "tls://"}
+_SILENT: dict[str, Any] = {"silence_logs": 50}
+
+
+class LocalScheduler(Scheduler):
+    """A scheduler without pages for browsers."""
+
+    def start_http_server(self, *_: Any, **__: Any) -> None:
+        """Open no port for them."""
+
+
+class LocalWorker(Worker):
+    """A worker without pages for browsers."""
+
+    def start_http_server(self, *_: Any, **__: Any) -> None:
+        """Open no port for them."""
+
+
+class LocalNanny(Nanny):
+    """The keeper of such a worker."""
+
+    def __init__(self, *arguments: Any, **named: Any):
+        super().__init__(*arguments, worker_class=LocalWorker, **named)
+
+
+def cluster_of(count: int, security: Any, **worker: Any) -> SpecCluster:
+    """A scheduler in this process, and so many workers of one thread in processes of their own.
+
+    `worker`: further options of Nanny.
+    """
+    common = {**_HOST, "security": security}
+    options = {**common, "nthreads": 1, "memory_limit": 0, **_SILENT, **worker}
+    spec = {"cls": LocalNanny, "options": options}
+    return SpecCluster(
+        scheduler={"cls": LocalScheduler, "options": {**common, "port": 0, "dashboard": False}},
+        worker=spec,
+        workers=dict.fromkeys(range(count), spec),
+        security=security,
+        **_SILENT,
+    )
