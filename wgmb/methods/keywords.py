@@ -20,6 +20,7 @@ class MethodKeywords(TypedDict, total=False):
     variant: Literal["shutter", "published", "even", "slices"]
     show: Literal["color", "tiles", "confidence", "count"]
     shading: Literal["auto", "off", "passes", "frames"]
+    where: Literal["everywhere", "edges"]
     reach: int
     weights: Literal["normalised", "published"]
     alpha_front: float

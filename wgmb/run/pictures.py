@@ -259,7 +259,7 @@ def steady(
         run.blur,
         run.motion,
         holdout=holdout or Holdout(displays=not request.blur.holdout),
-        fallback=run.fallback,
+        at_edges=run.at_edges,
         fill=request.video.duplicates == "fill",
         cuts=cuts.is_search,
         known_cuts=cuts.frames(0),

@@ -25,7 +25,7 @@ from ..shots.motion import MotionSource
 from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.clock import Clock
-from ..video.exposures import Exposures, Fallback, VideoBlur
+from ..video.exposures import Exposures, VideoBlur
 from ..video.holdouts import NONE, check_masks, files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
@@ -92,25 +92,23 @@ class VideoRequest(SettingsGroups):
         shutter = self.shutter.resolved(fps=_ANY_RATE)  # see VideoRun.at
         settings = replace(self.blur, method=self.blur.method or flow.method).for_pictures()
         blur = settings.make(shutter.make(), device)
-        motion, _ = flow.source(blur.device)
-        fallback = None
-        if searched := self.video.fallback(blur.device):
-            how += "; what is too fast for it is searched"
-            fallback = self._thorough(shutter.make(), blur), searched
+        motion, how = self.video.source(blur.device)
+        at_edges = None
+        if self.video.is_by_place(blur.device) and self.blur.method is None:
+            at_edges = self._at_edges(shutter.make(), blur)
         if self.shutter.seconds is not None:
             shutter = replace(shutter, shutter=self.shutter.shutter)
         shown = replace(self, blur=settings, shutter=shutter)
-        return VideoRun(shown, blur, motion, how, fallback)
+        return VideoRun(shown, blur, motion, how, at_edges)
 
-    def _thorough(self, shutter: Shutter, blur: Blur) -> Blur:
-        """The blur of searched pictures: gather, unless another method is asked for or fits."""
-        if self.blur.method is not None:
-            return blur
+    def _at_edges(self, shutter: Shutter, blur: Blur) -> Blur | None:
+        """The blur of pictures with edges of motion: gather there, if its options fit."""
+        own = getattr(self.blur, "where", None) or "edges"  # a method's option
         try:
-            settings = replace(self.blur, method="gather").for_pictures()
-            return settings.make(shutter, blur.device)
+            settings = replace(self.blur, method="gather", where=own)
+            return settings.for_pictures().make(shutter, blur.device)
         except InputError:  # an option of the other method
-            return blur
+            return None
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,8 @@ class VideoRun:
     motion: MotionSource | None
     how: str
     """The source of the motion, in words."""
-    fallback: Fallback | None = None
+    at_edges: Blur | None = None
+    """Blurs pictures with edges of motion, if not the usual Blur."""
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -144,7 +143,7 @@ class VideoRun:
         qualities = {"best": "`flow_quality=fast`", "fast": "`flow_quality=draft`"}
         if flow.flow == "search" and flow.flow_quality in qualities:
             found = f"{qualities[flow.flow_quality]} takes less"
-        elif (flow.flow == "search" and is_installed("cv2")) or self.fallback is not None:
+        elif (flow.flow == "search" and is_installed("cv2")) or self.at_edges is not None:
             found = "`flow=dis` takes less, but loses what is fast"
         elif flow.flow == "dis" and (flow.flow_quality, method) != ("fast", "tap"):
             by = "`flow_quality=fast`" if flow.flow_quality == "best" else "`method=tap`"
@@ -173,7 +172,7 @@ class VideoRun:
         shutter = self.request.shutter.resolved(fps=fps)
         if shutter == self.request.shutter:
             return self
-        for blur in (self.blur, *self.fallback[:1]) if self.fallback else (self.blur,):
+        for blur in filter(None, (self.blur, self.at_edges)):
             blur.shutter = shutter.make()
         return replace(self, request=replace(self.request, shutter=shutter))
 
@@ -186,7 +185,7 @@ class VideoRun:
             self.motion,
             clock=plan.clock,
             holdout=holdout_of(request.blur.holdout, plan.reader),
-            fallback=self.fallback,
+            at_edges=self.at_edges,
             fill=request.video.duplicates == "fill",
             cuts=cuts.is_search,
             known_cuts=cuts.frames(0),
@@ -230,14 +229,6 @@ class VideoRun:
     def _told_lost(self, before: tuple[int, int]) -> str:
         """A line about pictures since `before` in which something fast was lost, or ''."""
         lost, checked = (now - old for now, old in zip(self._lost_so_far(), before, strict=True))
-        if self.fallback is not None:
-            if not lost:
-                return ""
-            return (
-                f"something moves too fast for dense inverse search in {lost} of {checked} "
-                "pictures; they were searched as well, and blurred with "
-                f"{self.fallback[0].method.name}, which takes longer: `flow=dis` does without"
-            )
         if lost <= LOST * checked:
             return ""
         return (

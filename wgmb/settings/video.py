@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from ..video.read.reader import VideoReader
 
 
-_FALLBACK = "draft"  # quality of the search where dense inverse search loses too much
-_MARGIN = 1.6  # of that search beside dense inverse search, see BetterMatch,
-_BEST_MARGIN = 1.3  # and of the best one;
+_BEST_MARGIN = 1.3  # of the best search beside dense inverse search, see BetterMatch;
 _OTHERS = (1 / 3, 2.0), (1 / 3, 0.875)  # its further hypotheses, see there
 
 
@@ -50,6 +48,10 @@ class FlowSettings:
         settings, how = self.chosen(device)
         if settings.flow == "none":
             return None, how
+        if self.is_by_place(device):
+            from ..flow.dis.by_place import ByPlace
+
+            return ByPlace(), f"{how}; finer, and searched in blocks, where something is fast"
         if settings.flow == "dis":
             from ..flow.dis import Dis  # only where it is needed
 
@@ -75,19 +77,9 @@ class FlowSettings:
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         return is_best and software and is_installed("cv2")
 
-    def fallback(self, device: wgpu.GPUDevice) -> MotionSource | None:
-        """The source of motion for a video's pictures of which the quick one loses too much.
-
-        None unless "auto" became dense inverse search.
-        """
-        if self.flow != "auto" or self.chosen(device)[0].flow != "dis":
-            return None
-        from ..flow import Flow
-        from ..flow.dis import Dis
-        from ..flow.dis.better_match import BetterMatch
-
-        search = Flow(quality=_FALLBACK, device=device)
-        return BetterMatch(Dis("best"), search, _MARGIN)
+    def is_by_place(self, device: wgpu.GPUDevice) -> bool:
+        """True if "auto" becomes dense inverse search that is made better by place."""
+        return self.flow == "auto" and self.chosen(device)[0].flow == "dis"
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""

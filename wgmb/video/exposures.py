@@ -31,10 +31,6 @@ from .planes import Average, Planes, averages
 from .read.reader import VideoReader
 from .thumbnail import Thumbnail, change, is_cut
 
-Fallback = tuple[Blur, MotionSource]
-"""A blur of the pictures of which the source of motion loses too much, and its own source."""
-Views = Sequence[tuple[VideoFrames, Blur]]
-"""Pictures with their motion, and what blurs them: as usual, and where there is a fallback, its."""
 _BEFORE = 14  # pictures decoded before the first exposure, which its motion may depend on
 
 
@@ -43,9 +39,9 @@ class Exposures:
 
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
     `holdout`: what stays sharp. `fill`: repeated pictures are left out, and motion
-    goes on over the gap. `fallback`: what blurs the pictures of which `motion` loses too much, and
-    its own source. `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of
-    pictures that begin a shot. `planes`: make their light, which may be expanded for the blur.
+    goes on over the gap. `at_edges`: blurs the pictures with edges of motion, if not `blur`.
+    `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of pictures that begin a
+    shot. `planes`: make their light, which may be expanded for the blur.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much their
     times may be rounded [s]. InputError where the method takes two frames to either side.
     """
@@ -56,7 +52,7 @@ class Exposures:
         motion: MotionSource | None,
         *,
         holdout: Holdout | None = None,
-        fallback: Fallback | None = None,
+        at_edges: Blur | None = None,
         fill: bool = False,
         cuts: bool = True,
         known_cuts: Collection[int] = (),
@@ -69,7 +65,7 @@ class Exposures:
         self.holdout = holdout or Holdout(displays=False)
         self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
-        self._fallback = fallback
+        self._at_edges = at_edges
         self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
@@ -79,7 +75,7 @@ class Exposures:
     @property
     def methods(self) -> list[str]:
         """Names of the methods that blurred pictures so far, the usual one first."""
-        blurs = [self._blur, *([self._fallback[0]] if self._fallback else [])]
+        blurs = [self._blur, *([self._at_edges] if self._at_edges else [])]
         return [name for name in dict.fromkeys(b.method.name for b in blurs) if name in self._used]
 
     @property
@@ -104,28 +100,26 @@ class Exposures:
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
             change=change if self._fill else None,
-            reach=window(size, self._motion, self._fallback and self._fallback[1]),
+            reach=window(size, self._motion),
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        ways = [(self._blur, self._motion), *([self._fallback] if self._fallback else [])]
         changing = ChangingLight(self.device)
-        views = [
-            (VideoFrames(shots, blur, motion, self.holdout, self._planes, changing), blur)
-            for blur, motion in ways
-        ]
+        frames = VideoFrames(
+            shots, self._at_edges or self._blur, self._motion, self.holdout, self._planes, changing
+        )
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
-            yield frame, Exposure(self, shots, views, cells)
+            yield frame, Exposure(self, shots, frames, cells)
 
     def light(
-        self, shots: ShotReader[Thumbnail], views: Views, cells: Sequence[Cell]
+        self, shots: ShotReader[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        light, changes = self._blurred(shots, views, cells)
+        light, changes = self._blurred(shots, frames, cells)
         size, steps = (light.size[0], light.size[1]), []
         if changes is not None:
-            steps.append(("changed", views[0][0].changing.add))
+            steps.append(("changed", frames.changing.add))
         if self._planes.expansion:
             steps.append(("compressed", self._planes.compress))
         for name, step in steps:
@@ -139,7 +133,7 @@ class Exposures:
     def coded(
         self,
         shots: ShotReader[Thumbnail],
-        views: Views,
+        frames: VideoFrames,
         cells: Sequence[Cell],
         coding: Coding,
     ) -> CodedPicture:
@@ -148,14 +142,14 @@ class Exposures:
         if plain and averages(shots[cells[0].index].content.coded.coding, coding):
             pictures = [shots[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
-        light, changes = self._blurred(shots, views, cells, is_coded=True)
+        light, changes = self._blurred(shots, frames, cells, is_coded=True)
         encoder = self.device.create_command_encoder(label="encode")
         return self._planes.encode(encoder, light.create_view(), coding, changes)
 
     def _blurred(
         self,
         shots: ShotReader[Thumbnail],
-        views: Views,
+        frames: VideoFrames,
         cells: Sequence[Cell],
         is_coded: bool = False,
     ) -> tuple[wgpu.GPUTexture, LightChanges | None]:
@@ -167,10 +161,11 @@ class Exposures:
 
         def parts(cell: Cell) -> list[Part]:
             nonlocal begins
-            loses = len(views) > 1 and views[0][0].loses(cell.index)
-            frames, blur = views[loses]
+            blur = self._blur
+            if self._at_edges is not None and frames.has_edges(cell):
+                blur = self._at_edges
             self._used.add(blur.method.name)
-            found = frames.in_shot(cell.index)
+            found = frames.in_shot(cell.index, blur)
             if frames.change(cell, begins):
                 begins = False
             return [(replace(cell, share=share * cell.share), one, blur) for share, one in found]
@@ -182,7 +177,7 @@ class Exposures:
         else:
             rest = chain.from_iterable(map(parts, cells[1:]))
             light = self._sum.texture(size, chain(first, rest))
-        return light, None if begins else views[0][0].changing.changes(size)
+        return light, None if begins else frames.changing.changes(size)
 
 
 class VideoBlur(Exposures):
@@ -233,16 +228,16 @@ class Exposure:
 
     _run: Exposures
     _shots: ShotReader[Thumbnail]
-    _views: Views
+    _frames: VideoFrames
     _cells: Sequence[Cell]
 
     def light(self) -> wgpu.GPUTexture:
         """As linear light (rgba32float)."""
-        return self._run.light(self._shots, self._views, self._cells)
+        return self._run.light(self._shots, self._frames, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
         """In the planes of a video."""
-        return self._run.coded(self._shots, self._views, self._cells, coding)
+        return self._run.coded(self._shots, self._frames, self._cells, coding)
 
 
 class ExposedPicture(Protocol):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import wgpu
 
 from .. import gpu
 from ..exposure import Cell, evened
-from ..flow.dis import DisShot
+from ..gpu import wgsl
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
@@ -23,6 +24,7 @@ from .ragged import KEPT
 from .thumbnail import Thumbnail
 
 _Frames = Sequence[tuple[float, FrameViews]]
+EDGE = float(wgsl.load("methods/gather/tiles/active_tiles.wgsl").constant("EDGE"))  # px
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
 
 
@@ -43,10 +45,9 @@ class VideoFrames:
         planes: Planes | None = None,
         changing: ChangingLight | None = None,
     ):
-        self._shots, self._device = shots, blur.device
+        self._shots, self._blur, self._device = shots, blur, blur.device
         self._planes, self._images = planes or Planes(blur.device), TexturePool(blur.device)
         self.changing = changing or ChangingLight(blur.device)
-        self._neighbours = "neighbours" in blur.method.uses
         wants_depth = "depth" in blur.method.needs | blur.method.uses
         self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
         self._holdout = holdout or Holdout(displays=False)
@@ -55,16 +56,18 @@ class VideoFrames:
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, _Frames] = {}
 
-    def in_shot(self, index: int) -> Sequence[tuple[float, FrameInShot]]:
-        """A picture, between its neighbours if the method takes them.
+    def in_shot(self, index: int, blur: Blur | None = None) -> Sequence[tuple[float, FrameInShot]]:
+        """A picture, between its neighbours if the method takes them, of `blur` if not of its own.
 
         It is the sum of so much of each, one for each hypothesis about its motion, or about that of
         neighbours. What they refer to may be overwritten once two others have been asked for.
         """
         wanted = [index]
-        if self._source is not None and self._neighbours:
+        method = (blur or self._blur).method
+        takes = method.needs | method.uses
+        if self._source is not None and "neighbours" in takes:
             wanted = [i for i in (index - 1, index, index + 1) if self._shots.moves_on(index, i)]
-        found = {i: self._frame(i) for i in wanted}
+        found = {i: self._frame(i, "depth" in takes) for i in wanted}
         made: list[tuple[float, FrameInShot]] = []
         for number, (share, _) in enumerate(max(found.values(), key=len)):
             views = {i: of[min(number, len(of) - 1)][1] for i, of in found.items()}
@@ -92,16 +95,28 @@ class VideoFrames:
         gpu.submit(self._device, encoder)
         return True
 
-    def loses(self, index: int) -> bool:
-        """True if the source tells that it loses too much of a picture, or of one beside it."""
-        shot = None if self._source is None else self._source.shot(index)
-        return isinstance(shot, DisShot) and shot.loses(index)
+    def has_edges(self, cell: Cell) -> bool:
+        """True if the motion of a picture has edges within its exposure, as gather looks for."""
+        if self._source is None:
+            return False
+        times = cell.shutter.span
+        longest = max(abs(time) for time in times) * max(self._factors(cell.index))
+        return longest * self._source.change(cell.index) > EDGE
 
-    def _frame(self, index: int) -> _Frames:
-        """The views of one picture, and its share, for each hypothesis about its motion."""
+    def _frame(self, index: int, depth: bool = False) -> _Frames:
+        """The views of one picture, and its share, for each hypothesis about its motion.
+
+        `depth`: whether it is wanted, where the source finds it only then.
+        """
         kept = self._frames.get(index)
         light = self._light(index).create_view()
         if kept is not None and index in self._lights and kept[0][1].color.texture is light.texture:
+            if depth and kept[0][1].depth is None and self._source is not None:
+                found = self._source.depth(index)
+                if found is not None:
+                    found = found.create_view()
+                    kept = [(share, replace(one, depth=found, key=object())) for share, one in kept]
+                    self._frames[index] = kept
             return kept
         motions = self._motions(index) or [(1.0, None, None)]
         holdout = None if motions[0][1] is None else self._held_out(index)
@@ -112,7 +127,7 @@ class VideoFrames:
         while len(self._frames) >= KEPT:
             self._frames.pop(next(iter(self._frames)))
         self._frames[index] = made
-        return made
+        return self._frame(index, depth) if depth and made[0][1].depth is None else made
 
     def _light(self, index: int) -> wgpu.GPUTexture:
         """The texture of one picture, kept until others need its place."""

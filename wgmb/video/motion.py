@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import wgpu
 from ..flow import Flow, Shot
 from ..flow.dis import Dis
 from ..flow.dis.better_match import BetterMatch, Both, Hypothesis, MixedShot
+from ..flow.dis.by_place import ByPlace, PlaceShot
 from ..gpu.textures import TexturePool
 from ..shots.motion import Found, MotionSource, ShotMotion
 from ..shots.reader import ShotReader
@@ -45,7 +47,7 @@ class VideoMotion(ShotMotion):
         picture = pictures.get(type(source), searched.grey)
         super().__init__(source, picture, shots.moves_on, depth)
         self._device, self._images = device, TexturePool(device)
-        is_searched = not isinstance(source, Dis)  # dense inverse search alone is smooth
+        is_searched = not isinstance(source, Dis | ByPlace)  # which are smooth
         self._ragged = RaggedMotion(device) if is_searched else None
 
     def hypotheses(self, index: int) -> Sequence[Ways]:
@@ -74,8 +76,25 @@ class VideoMotion(ShotMotion):
             if found is None:
                 return []
             return [Ways(1.0, *self._smooth(index, 0, found.motion, found.depth))]
-        found = shot(index)
+        if isinstance(shot, PlaceShot):
+            motion = shot.motion(index)
+            found = None if motion is None else (motion, None)
+        else:
+            found = shot(index)
         return [] if found is None else self._uploaded(index, [Hypothesis(1.0, found)])
+
+    def change(self, index: int) -> float:
+        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+        shot = self.shot(index)
+        return shot.change(index) if isinstance(shot, PlaceShot) else math.inf
+
+    def depth(self, index: int) -> wgpu.GPUTexture | None:
+        """The depth of a picture whose motion was uploaded without; None where there is none."""
+        shot = self.shot(index)
+        found = shot.depth(index) if isinstance(shot, PlaceShot) else None
+        if found is None:
+            return None
+        return self._images.upload(f"depth {index % KEPT}", found, "r32float").texture
 
     def _uploaded(self, index: int, hypotheses: Sequence[Hypothesis]) -> Sequence[Ways]:
         made: list[Ways] = []

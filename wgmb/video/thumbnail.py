@@ -20,6 +20,7 @@ from ..shots import repeats
 from ..shots.cuts import small_step, smalls_differ
 from .planes.matrices import from_samples
 
+_LUMA = 77, 150, 29  # of 256: ITU-R BT.601
 _LUMA_ROWS = 4  # of a block of pixels, that are averaged
 _CHROMA = 2  # rows and columns of a block, for the other planes
 _WHITE = {PQ: 0.58, HLG: 0.75}  # signal of the white of text and paper (ITU-R BT.2408)
@@ -74,15 +75,15 @@ class Thumbnail:
         coding, planes = self._integers.coding, self._colors
         most, unit = 2**coding.bits - 1, 2 ** (coding.bits - 8)
         if coding.model == "rgb" and coding.bits == 8:
-            total = planes[1].astype(np.uint16)
-            total *= 5
-            total += planes[2]
-            total += planes[0]
-            total += planes[0]
-            return (total >> 3).astype(np.uint8)
+            total = np.full(planes[0].shape, 128, np.uint16)
+            for plane, weight in zip(planes, _LUMA, strict=True):
+                total += np.uint16(weight) * plane.astype(np.uint16)
+            return (total >> 8).astype(np.uint8)
         if coding.model == "rgb":
-            mean = 0.25 * planes[0].astype(np.float32) + 0.625 * planes[1] + 0.125 * planes[2]
-            return (mean * (255 / most)).astype(np.uint8)
+            parts = (
+                w / 256 * plane.astype(np.float32) for w, plane in zip(_LUMA, planes, strict=True)
+            )
+            return np.rint(sum(parts) * (255 / most)).astype(np.uint8)
         low, high = (0, most) if coding.full_range else (16 * unit, 235 * unit)
         table = np.clip((np.arange(most + 1) - low) / (high - low), 0, 1)
         return np.rint(255 * table).astype(np.uint8)[planes[0]]

@@ -86,11 +86,17 @@ class Dis:
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, depth: bool
     ) -> Found:
         """Motion and depth of a picture, from the grey of its neighbours, one of which is there."""
-        motion = self._motion(prev, here, next, self._finest(here.shape))
+        motion = self.motion(prev, here, next)
         if not depth:
             return motion, None
         ways = [motion[..., 2 * k : 2 * k + 2] for k, p in enumerate((prev, next)) if p is not None]
-        return motion, functools.reduce(np.minimum, map(self._depth, ways))
+        return motion, functools.reduce(np.minimum, map(self.depth, ways))
+
+    def motion(
+        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None
+    ) -> np.ndarray:
+        """Motion (height, width, 4) [px] alone."""
+        return self._motion(prev, here, next, self._finest(here.shape))
 
     def tells(
         self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, motion: np.ndarray
@@ -146,8 +152,11 @@ class Dis:
         halvings = int(math.log2(max(1.0, max(shape) / _ENDS_AT)))
         return min(halvings, _HALVINGS)
 
-    def _depth(self, way: np.ndarray) -> np.ndarray:
-        """Depth by motion: pixels that do not move like most of the picture are nearer."""
+    def depth(self, way: np.ndarray) -> np.ndarray:
+        """Depth by motion (height, width, 2) [px] to a neighbour, (height, width).
+
+        Pixels that do not move like most of the picture are nearer.
+        """
         height, width = way.shape[:2]
         step = max(1, max(width, height) // 40)
         y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]

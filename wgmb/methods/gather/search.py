@@ -28,6 +28,7 @@ class Search:
     def encode(self, encoder, inputs, layers, starts, worklists, output, added: Added | None):
         """Record the classification of blocks, then all pixels.
 
+        The static cells of `worklists` are copied, if there are any.
         `starts`: of searches, the tiles' candidates and what is scattered. `added`: moving light.
         """
         timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
@@ -93,8 +94,9 @@ class Search:
             ("main", others, {}, None),
             ("main", crowded, {"CROWDED": True}, None),
             ("main", plain, {"PLAIN": True}, None),
-            ("copy_static", worklists["static"], {"PLAIN": True}, added),
         ]
+        if static := worklists.get("static"):
+            passes.append(("copy_static", static, {"PLAIN": True}, added))
         if added is not None:
             passes += [("main", lit[1], {}, added), ("main", lit[2], {"CROWDED": True}, added),
                        ("main", lit[0], {"PLAIN": True}, added)]  # fmt: skip

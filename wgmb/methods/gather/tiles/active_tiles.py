@@ -24,10 +24,14 @@ def uniform(device: wgpu.GPUDevice, name: str, data: np.ndarray) -> wgpu.GPUBuff
 
 
 class ActiveTiles:
-    """Worklists of cells, a cell being a few tiles side by side."""
+    """Worklists of cells, a cell being a few tiles side by side.
 
-    def __init__(self, device: wgpu.GPUDevice):
+    `at_edges`: only tiles that the edges of the frame's own motion reach are active.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice, at_edges: bool = False):
         self._device, self._lists = device, ScratchBuffer(device)
+        self._at_edges = at_edges
 
     def encode(self, encoder, inputs) -> dict[str, dict]:
         """Record which tiles are active; the worklists of active_tiles.wgsl, by name."""
@@ -41,14 +45,15 @@ class ActiveTiles:
         data = np.zeros((), kernel.source.dtype("SourceFrame"))
         data["words"] = words
         tiles = replace(inputs.bindings, size=grid)
-        for frame in inputs.frames:
+        for frame in inputs.frames[:1] if self._at_edges else inputs.frames:
             data["offset"] = frame.offset
             own = {
                 "source": uniform(self._device, "source", data),
                 "motion": frame.motion,
                 "lists": lists,
             }
-            marking = gpu.kernel(self._device, file, {"motion": gpu.stored(frame.motion)})
+            texels = {"motion": gpu.stored(frame.motion)}
+            marking = gpu.kernel(self._device, file, texels, AT_EDGES=self._at_edges)
             marking.run(encoder, "mark_active_tiles", tiles, **own)
         kernel.run(encoder, "find_distances", tiles, **own)
         kernel.run(encoder, "build_worklists", replace(inputs.bindings, size=(grid[1], 1)), **own)

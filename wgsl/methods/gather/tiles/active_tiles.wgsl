@@ -26,6 +26,9 @@ const TILE_FLAGS: u32 = 5u;     // of every tile: 1 if it is active
 const DISTANCES: u32 = 6u;      // of every cell: tiles to the nearest active one, MARGIN + 1 if that is farther than MARGIN
 const SECTIONS: u32 = 7u;
 
+override AT_EDGES: bool = false;    // only tiles that an edge of motion reaches are active
+
+const EDGE: f32 = 4.0;          // px by which motion in a tile changes at an edge, from where it is by the ends of the exposure
 const EDGE_RADIUS: i32 = 2;     // a silhouette takes the motions of pixels up to so far away [px]
 const MARGIN: i32 = 2;          // tiles around a cell that are searched for active ones
 
@@ -60,10 +63,17 @@ fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
     let u = max_abs_time(source.offset);
     let farthest = abs(union_with_origin(displacement_box(least, most, u), displacement_box(least, most, -u)));
     let is_static = all(farthest < vec4f(0.7 * STATIC_EPSILON));
-    let count = select(across * (last.y - first.y + 1), 0, is_static);
+    let count = select(across * (last.y - first.y + 1), 0, is_static || (AT_EDGES && !has_edge(least, most, window)));
     for (var i = 0; i < count; i++) {
         atomicStore(&lists[tile_flag_at(first + vec2i(i % across, i / across))], 1u);
     }
+}
+
+/// True if displacements by either end of the exposure differ much, of all motions between two.
+fn has_edge(least: vec4f, most: vec4f, window: vec2f) -> bool {
+    let opening = displacement_box(least, most, window.x);
+    let closing = displacement_box(least, most, window.y);
+    return any(max(opening.zw - opening.xy, closing.zw - closing.xy) > vec2f(EDGE));
 }
 
 /// After all frames: how far every cell is from the nearest active tile [tiles].

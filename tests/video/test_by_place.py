@@ -1,0 +1,189 @@
+"""Videos without a GPU: quick motion, made better by place, and a blur that is steady."""
+
+import numpy as np
+import pytest
+
+import wgmb
+from wgmb import Flow, gpu
+from wgmb.run.video import VideoRequest
+from wgmb.settings import BlurSettings
+from wgmb.settings.video import VideoSettings
+
+pytest.importorskip("cv2")
+
+import cv2
+
+from wgmb.flow.dis import Dis
+from wgmb.flow.dis.better_match import BetterMatch
+from wgmb.flow.dis.by_place import ByPlace
+
+WIDTH, HEIGHT, COUNT = 320, 180, 5
+
+
+def texture(width, height, cell, seed):
+    """(height, width, 3) display values of soft cells."""
+    rng = np.random.default_rng(seed)
+    cells = rng.uniform(0.15, 0.9, (-(-height // cell) + 1, -(-width // cell) + 1, 3))
+    return cv2.resize(cells.astype("f4"), (width, height), interpolation=cv2.INTER_CUBIC)
+
+
+def grounds(kind):
+    """The ground of each picture."""
+    if kind == "flat":
+        return [np.full((HEIGHT, WIDTH, 3), 0.3, "f4")] * COUNT
+    wide = 0.5 * texture(WIDTH + 40, HEIGHT, 9, 1)
+    step = 3 if kind == "moving" else 0
+    return [wide[:, step * n : step * n + WIDTH] for n in range(COUNT)]
+
+
+def shot(speed, side, kind):
+    """(count, height, width, 3) uint8: a body that moves to the right by `speed` px a picture."""
+    body, pictures = texture(side, side, max(4, side // 5), 2), []
+    for n, ground in enumerate(grounds(kind)):
+        shown = ground.copy()
+        left = round(WIDTH / 2 + speed * (n - COUNT // 2) - side / 2)
+        top = (HEIGHT - side) // 2
+        cut = slice(max(left, 0), max(min(left + side, WIDTH), 0))
+        shown[top : top + side, cut] = body[:, cut.start - left : cut.stop - left]
+        pictures.append(np.rint(255 * shown.clip(0, 1)).astype("u1"))
+    return np.array(pictures)
+
+
+def streak(blurred, ground, side):
+    """Columns in which a picture differs from its ground, in the rows of the body."""
+    rows = slice((HEIGHT - side) // 2 + side // 4, (HEIGHT + side) // 2 - side // 4)
+    apart = np.abs(blurred.astype(float) - 255 * ground)[rows].mean(axis=(0, 2))
+    return int((apart > 8).sum())
+
+
+def law(*args):
+    return pytest.param(*args)
+
+
+def all_law(*args):
+    return pytest.param(*args, marks=pytest.mark.full)
+
+
+CASES = [
+    law(12, 40, "textured"), law(48, 40, "textured"), law(40, 24, "flat"), law(48, 60, "moving"),
+    *(all_law(speed, side, kind)
+      for speed in (2, 6, 16, 24, 32, 40, 56, 64) for side in (24, 60) for kind in ("textured",)),
+    *(all_law(speed, 40, kind) for speed in (6, 24, 60) for kind in ("flat", "moving")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("speed", "side", "kind"), CASES)
+def test_a_body_at_a_constant_speed_has_the_same_streak_in_every_picture(device, speed, side, kind):
+    """As long as the body and half of its way, within a tenth and a pixel of the soft ends."""
+    pictures, want = shot(speed, side, kind), side + speed / 2
+    results = list(wgmb.blur_pictures(list(pictures), shutter=180, device=device))
+    lengths = [
+        streak(results[n], ground, side)
+        for n, ground in enumerate(grounds(kind))
+        if 0 < n < COUNT - 1 and abs(n - COUNT // 2) * speed + want / 2 < WIDTH / 2
+    ]
+    assert lengths and max(abs(length - want) for length in lengths) <= 0.1 * want + 2, lengths
+
+
+def test_the_motion_of_a_picture_depends_on_its_neighbours_alone():
+    """Whatever was asked for before, and in whatever order, it is the same to the bit."""
+    pictures = [p[..., 1].copy() for p in shot(48, 40, "textured")]
+
+    def load(number):
+        return pictures[number] if 0 <= number < COUNT else None
+
+    whole = ByPlace().shot(load)
+    forwards = [whole(n) for n in range(COUNT)]
+    other = ByPlace().shot(load)
+    for n in (3, 0, 4, 1, 2):
+        for one, two in zip(other(n), forwards[n], strict=True):
+            np.testing.assert_array_equal(one, two)
+    part = ByPlace().shot(lambda n: load(n) if 1 <= n <= 3 else None)
+    np.testing.assert_array_equal(part(2)[0], forwards[2][0])
+
+
+def test_blocks_find_a_body_that_dense_inverse_search_loses():
+    pictures = [p[..., 1].copy() for p in shot(48, 40, "textured")]
+    row, middle = HEIGHT // 2, slice(WIDTH // 2 - 10, WIDTH // 2 + 10)
+    quick = Dis("fast").motion(*pictures[1:4])[row, middle]
+    assert np.abs(quick[:, 2] - 48).min() > 20
+    found = ByPlace().motion(pictures[1:4])[row, middle]
+    assert np.abs(found - [-48, 0, 48, 0]).max() < 2
+    first = ByPlace().motion([None, *pictures[1:3]])[row, 106:122]
+    assert np.abs(first - [-48, 0, 48, 0]).max() < 2
+
+
+def test_motion_is_as_dense_inverse_search_finds_it_where_all_moves_alike():
+    wide = texture(WIDTH + 60, HEIGHT, 9, 3)
+    pictures = [np.rint(200 * wide[:, 3 * n : 3 * n + WIDTH, 1]).astype("u1") for n in range(3)]
+    np.testing.assert_array_equal(ByPlace().motion(pictures), Dis("fast").motion(*pictures))
+
+
+def test_gather_at_edges_taps_the_rest(device):
+    """Far from a body that crosses a ground, the blur is tap's to the bit; near it, gather's."""
+    y, x = np.mgrid[:96, :192]
+    color = texture(192, 96, 7, 4)
+    body = (np.abs(x - 96) < 12) & (np.abs(y - 48) < 12)
+    motion = np.where(body[..., None], np.float32([-40, 0, 40, 0]), np.float32([-2, 0, 2, 0]))
+    frame = wgmb.Frame(color, motion=motion, depth=np.where(body, 1, 2).astype("f4"))
+    blurs = {
+        name: wgmb.Blur(method, device=device, **options)(frame)
+        for name, method, options in (
+            ("tap", "tap", {}),
+            ("gather", "gather", {"shading": "off"}),
+            ("edges", "gather", {"shading": "off", "where": "edges"}),
+        )
+    }
+    far, near = np.abs(x - 96) > 80, (np.abs(x - 96) < 20) & (np.abs(y - 48) < 16)
+    np.testing.assert_array_equal(blurs["edges"][far], blurs["tap"][far])
+    np.testing.assert_array_equal(blurs["edges"][near], blurs["gather"][near])
+    assert np.abs(blurs["gather"] - blurs["tap"])[near].max() > 0.1
+    # Across the border of the tiles nothing jumps: both follow the same motion.
+    assert np.abs(blurs["edges"] - blurs["gather"]).max() < 0.02
+
+
+def test_pictures_without_edges_of_motion_are_tapped(device):
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        pytest.skip("a GPU searches every picture")
+    wide = texture(WIDTH + 60, HEIGHT, 9, 3)
+    pictures = [np.rint(200 * wide[:, 3 * n : 3 * n + WIDTH]).astype("u1") for n in range(4)]
+    auto = wgmb.blur_pictures(pictures, device=device)
+    tapped = wgmb.blur_pictures(pictures, device=device, method="tap")
+    for one, two in zip(auto, tapped, strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_auto_is_made_better_by_place_without_a_gpu_alone(device):
+    run = VideoRequest().open(device)
+    is_slow = run.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+    assert (run.at_edges is not None) == is_slow == ("in blocks" in run.how)
+    for flow in ("dis", "search", "none"):
+        assert VideoRequest(video=VideoSettings(flow=flow)).open(device).at_edges is None
+    if run.at_edges is None:
+        return
+    assert run.blur.method.name == "tap" and run.at_edges.method.name == "gather"
+    assert run.quicker.startswith("`flow=dis`")
+
+
+@pytest.mark.parametrize("settings", [{"method": "tap"}, {"method": "gather"}, {"samples": 1000}])
+def test_a_method_that_is_asked_for_blurs_all_pictures(device, settings):
+    run = VideoRequest(blur=BlurSettings(**settings)).open(device)
+    assert run.at_edges is None
+    if run.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE:
+        assert isinstance(run.motion, ByPlace)
+
+
+@pytest.mark.parametrize("quality", ["best", "fast"])
+def test_without_a_gpu_the_best_search_takes_dense_inverse_search_where_that_matches_better(
+    device, quality, monkeypatch
+):
+    settings = VideoSettings(flow="search", flow_quality=quality)
+    is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+    motion, how = settings.source(device)
+    is_mixed = quality == "best" and is_slow
+    assert type(motion) is (BetterMatch if is_mixed else Flow)
+    assert ("dense inverse search" in how) == is_mixed
+    if is_mixed:
+        assert motion.reach((640, 360)) == 1 + Flow(quality="fast", device=device).reach((640, 360))
+    monkeypatch.setattr("wgmb.settings.video.is_installed", lambda package: False)
+    assert type(settings.source(device)[0]) is Flow and settings.source(device)[1] == "search"
