@@ -91,14 +91,46 @@ inside() {
     ' bash "$root" "$user" "$home" "$folder" "${passed[@]}" sh -c "$1" </dev/null
 }
 
-table=() failed=0
+table=() failed=0 running=
+print_table() {
+    echo '| system | command | exit | wall s | processor s | root MB | system packages installed |'
+    echo '|---|---|---|---|---|---|---|'
+    [ ${#table[@]} = 0 ] || printf '%s\n' "${table[@]}"
+}
+
+# waited COMMAND: run it as a job of its own. While a command in the foreground runs, bash handles
+# no signal; here it ends all that the job has started, and prints the rows that there are.
+waited() {
+    local code=0
+    set -m
+    "$@" &
+    running=$!
+    set +m
+    wait $running || code=$?
+    running=
+    return $code
+}
+
+broken_off() {  # the namespace of processes dies with unshare, which heeds no other signal
+    trap '' INT TERM HUP
+    [ -z "$running" ] || kill -KILL -- "-$running" 2>/dev/null || :
+    echo "bare_machine: broken off by $1" >&2
+    print_table
+    exit $((128 + $2))
+}
+trap 'broken_off HUP 1' HUP
+trap 'broken_off INT 2' INT
+trap 'broken_off TERM 15' TERM
+
+timed() { { time inside "$3" $5 "$4" >"$2" 2>&1; } 2>"$1"; }  # timed TIMES LOG ROOT COMMAND [--offline]
 try() {  # try SYSTEM ROOT COMMAND [--offline]: run it and add a row to the table
     local log code took begun
     log="$2.$(printf %s "$3$4" | tr -c 'a-z0-9' _ | cut -c 1-60).log"
     echo "bare_machine: $1: $3 $4" >&2
     begun=$(date +%s.%N)
     TIMEFORMAT='%U %S'
-    took=$({ time inside "$2" $4 "$3" >"$log" 2>&1; } 2>&1) && code=0 || code=$?
+    waited timed "$log.time" "$log" "$2" "$3" "$4" && code=0 || code=$?
+    took=$(cat "$log.time")
     [ $code = 0 ] || { failed=1; tail -15 "$log" >&2; }
     table+=("$(awk -v name="$1" -v what="$3 $4" -v code=$code -v begun="$begun" \
         -v now="$(date +%s.%N)" -v size="$(du -sm "$2" | cut -f1)" -v installed="$(
@@ -111,9 +143,9 @@ try() {  # try SYSTEM ROOT COMMAND [--offline]: run it and add a row to the tabl
 interrupt() {
     local seconds=1 broken="env --default-signal=INT timeout --signal=INT --kill-after=60"
     while echo "bare_machine: $1: $3, broken off after $seconds s" >&2
-        ! inside "$2" "$broken $seconds $3" >"$2.interrupted.log" 2>&1; do
+        ! waited inside "$2" "$broken $seconds $3" >"$2.interrupted.log" 2>&1; do
         echo "bare_machine: $1: $3, without a network" >&2
-        ! inside "$2" --offline "$broken 60 $3" >>"$2.interrupted.log" 2>&1 || return 0
+        ! waited inside "$2" --offline "$broken 60 $3" >>"$2.interrupted.log" 2>&1 || return 0
         seconds=$((seconds * 2))
         [ $seconds -le 128 ] || return 0
     done
@@ -124,7 +156,7 @@ for system in "${systems[@]}"; do
     mkdir -p "$(dirname "$root")"
     if [ -z "$again" ] || [ ! -d "$root/home/somebody" ]; then
         rm -rf --one-file-system "$root"
-        make_root "$system" "$root" || { failed=1; table+=("| $system | no root could be made | | | | | |"); continue; }
+        waited make_root "$system" "$root" || { failed=1; table+=("| $system | no root could be made | | | | | |"); continue; }
     fi
     home=$root/root owner=0:0
     [ "$who" = root ] || home=$root/home/somebody owner=1000:1000
@@ -139,7 +171,5 @@ for system in "${systems[@]}"; do
     [ -z "$offline" ] || for command in "$@"; do try "$system" "$root" "$command" --offline; done
     [ -n "$keep$again" ] || rm -rf --one-file-system "$root"
 done
-echo '| system | command | exit | wall s | processor s | root MB | system packages installed |'
-echo '|---|---|---|---|---|---|---|'
-printf '%s\n' "${table[@]}"
+print_table
 exit $failed
