@@ -19,6 +19,7 @@ _NOISE = 5  # levels of 255 by which codecs change what stands
 _EDGE = 0.25  # of the contrast, by which they change it beside what moves
 _CONTRAST = 30, 50  # levels of 255 from which a pixel differs, or clearly, from those beside it
 _MOVING = 0.3  # share of changes around a pixel, from which its surroundings move
+_SEEN = 3  # pictures in which a stroke differs from ground that may be as bright in others
 _SUPPORT = 3  # pixels of 5 x 5 that must stand with one
 _TILE = 16  # px; surroundings are 5 x 5 tiles
 _NEAR = 8  # px; a digit that changes has what stands within one or two of these
@@ -63,10 +64,9 @@ class Displays:
         back, ahead = self._run(number, -1), self._run(number, 1)
         if len(back) + len(ahead) < _STILL:
             return None
-        textured, clearly = (here.contrast > least for least in _CONTRAST)
-        before, after = _length(back, textured), _length(ahead, textured)
-        stands = before + after >= _STILL
-        stands &= textured
+        count, differs = self._standing(number, back, ahead)
+        stands, clearly = ((count >= _STILL) & (often >= _SEEN) for often in differs)
+        textured = here.contrast > _CONTRAST[0]
         if not self._always and 2 * np.count_nonzero(stands) > np.count_nonzero(textured):
             return None  # the camera stands
         core = stands & clearly & _moves_around(back + ahead, textured.shape)
@@ -78,6 +78,28 @@ class Displays:
         whole |= _edges(whole, here.grey)
         low, high = SHARES
         return whole if self._always or low <= whole.mean() <= high else None
+
+    def _standing(
+        self, number: int, back: list[np.ndarray], ahead: list[np.ndarray]
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Number of steps around a picture, without a break, in which each pixel does not change,
+        and of the pictures meanwhile in which it differs from those beside it by each of _CONTRAST:
+        ground that passes may be as bright as a stroke for a while.
+
+        `back`, `ahead`: the unchanged pixels of each step.
+        """
+        here = self._picture(number).contrast
+        count = np.zeros(here.shape, np.uint8)
+        often = [(here > least).astype(np.uint8) for least in _CONTRAST]
+        for way, steps in ((-1, back), (1, ahead)):
+            going = np.ones(here.shape, bool)
+            for k, still in enumerate(steps, 1):
+                going &= still
+                count += going
+                there = self._picture(number + way * k).contrast
+                for total, least in zip(often, _CONTRAST, strict=True):
+                    total += going & (there > least)
+        return count, often
 
     def _picture(self, number: int) -> _Picture:
         if number not in self._pictures:
@@ -120,15 +142,6 @@ def _contrast(grey: np.ndarray) -> np.ndarray:
             choose(whole[1:], before[:-1], out=whole[1:])
             choose(whole[:-1], before[1:], out=whole[:-1])
     return most - least
-
-
-def _length(steps: list[np.ndarray], among: np.ndarray) -> np.ndarray:
-    """Number of steps without a change from the picture on, of the pixels `among`."""
-    going, count = among.copy(), np.zeros(among.shape, np.uint8)
-    for still in steps:
-        going &= still
-        count += going
-    return count
 
 
 def _tiles(plane: np.ndarray, side: int, choose: np.ufunc) -> np.ndarray:
