@@ -162,7 +162,8 @@ def test_auto_is_made_better_by_place_without_a_gpu_alone(device):
     if run.at_edges is None:
         return
     assert run.blur.method.name == "tap" and run.at_edges.method.name == "gather"
-    assert run.quicker.startswith("`flow=dis`")
+    assert run.quicker.startswith("`flow=dis`") and "`flow=search` is better" in run.advice
+    assert VideoRequest(video=VideoSettings(flow="search")).open(device).advice == ""
 
 
 @pytest.mark.parametrize("settings", [{"method": "tap"}, {"method": "gather"}, {"samples": 1000}])

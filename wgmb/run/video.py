@@ -130,11 +130,13 @@ class VideoRun:
 
     @property
     def advice(self) -> str:
-        """A line on what would find the motion sooner, or ''."""
+        """A line on what would find the motion sooner, or better, if that was left open."""
         is_slow = self.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        if self.request.video.flow == "auto" and is_slow and not is_installed("cv2"):
+        if self.request.video.flow != "auto" or not is_slow:
+            return ""
+        if not is_installed("cv2"):
             return f"without a GPU, OpenCV finds motion much sooner: {install_command('flow')}"
-        return ""
+        return "no GPU, so motion is found quickly: `flow=search` is better, but takes much longer"
 
     @property
     def quicker(self) -> str:
