@@ -242,6 +242,21 @@ def test_a_part_that_cannot_be_begun_is_tried_again_and_a_worker_that_never_can_
     assert notes in ([], ["worker 1 on there does nothing: no such folder"])
 
 
+def test_frames_of_a_worker_whose_gpu_is_lost_are_done_by_others(drive):
+    def behave(name, chosen):
+        return well(chosen) if name == "a" else DeviceError("the GPU device was lost")
+
+    report, client, notes, _ = drive({"a": GOOD, "b": WorkerState("1", "there", 2)}, behave)
+    assert sorted(report.done) == list(range(1, COUNT + 1)) and not report.failed
+    assert sum(name == "b" for name, _ in client.given) == 1
+    assert notes == ["worker 1 on there does nothing: the GPU device was lost"]
+
+
+def test_a_run_whose_workers_have_all_lost_their_gpu_is_an_error(drive):
+    with pytest.raises(DeviceError, match="no worker is left: the GPU device was lost"):
+        drive({"a": GOOD, "b": GOOD}, lambda name, chosen: DeviceError("the GPU device was lost"))
+
+
 def test_a_part_that_nobody_can_begin_fails_with_the_reason(drive):
     def behave(name, chosen):
         return ZeroDivisionError("a fault") if 5 in chosen else well(chosen)

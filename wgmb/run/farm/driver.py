@@ -238,9 +238,11 @@ class Driver:
         if (waits or self._farm.cluster is not None) and now < self._idle_since + patience:
             return False
         why = self._refusals[-1][1] if self._refusals else f"no worker in {patience:.0f} s"
+        lacks_gpu = bool(self._refusals) and all(lacks for lacks, _ in self._refusals)
         if not self._tasks:
-            lacks_gpu = bool(self._refusals) and all(lacks for lacks, _ in self._refusals)
             raise (DeviceError if lacks_gpu else InputError)(f"no worker can do this: {why}")
+        if lacks_gpu:
+            raise DeviceError(f"no worker is left: {why}")
         self.report.stopped = f"no worker is left: {why}"
         return True
 
@@ -370,12 +372,17 @@ class Driver:
             return
         why = str(error) if isinstance(error, Error) else f"{type(error).__name__}: {error}"
         why = " ".join(why.split())
+        if isinstance(error, DeviceError):  # its GPU is lost, which says nothing of the part
+            worker.why_not = why
+            self._refuse(worker, True)
+            self._parts.appendleft(part)
+            return
         is_second = bool(part.refused_by)
         part.refused_by.add(worker.address)
         worker.faults += 1
         if worker.faults > 1:
             worker.why_not = why
-            self._refuse(worker, isinstance(error, DeviceError))
+            self._refuse(worker, False)
         if is_second:
             self._fail(part, why)
         else:
