@@ -106,6 +106,16 @@ def test_frames_in_any_order_from_many_threads_are_those_of_blur_pictures(hosted
         np.testing.assert_array_equal(np.stack(planes_of(frame), 2), want[n], f"frame {n}")
 
 
+def test_a_lost_device_is_told_in_one_line(hosted, device):
+    vs, host = hosted
+    own = wgmb.gpu.second_device(device)
+    clip = clip_of(vs, vs.RGB24, lambda n: np.moveaxis(picture(n), 2, 0))
+    blurred = host.blur(clip, shutter=180, flow="none", device=own)
+    own.destroy()
+    with pytest.raises(vs.Error, match=r"^the GPU device was lost: .*$"):
+        blurred.get_frame(1)
+
+
 def test_yuv_of_10_bits_is_that_of_the_file(hosted, device, tmp_path):
     vs, host = hosted
     tags = (1, 9, 16, 9)

@@ -13,6 +13,7 @@ from typing import Any, Literal, Unpack, cast
 import numpy as np
 import wgpu
 
+from .. import gpu
 from ..color.coding import FLOAT, SRGB, UNSPECIFIED, CodedPicture, Coding
 from ..errors import Error, InputError
 from ..extras import needed_by
@@ -146,7 +147,7 @@ class _Frames:
         return made
 
     def __getitem__(self, number: int) -> CodedPicture:
-        with self._lock:
+        with self._lock, gpu.reported():
             if number not in self._kept:
                 self._make(number)
             return self._kept[number]
