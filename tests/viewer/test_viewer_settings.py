@@ -1,5 +1,6 @@
 """Settings, pictures and recordings that the viewer saves, and the commands that take them."""
 
+import os
 import random
 import tomllib
 from pathlib import Path
@@ -8,6 +9,7 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 
+import make_frames as make
 from viewer_hand import BESIDE, PLAIN, SAMPLE, put
 from wgmb import Blur, InputError, Render
 from wgmb.cli import app
@@ -213,6 +215,21 @@ def test_the_command_line_is_one(state, tmp_path):
     out = tmp_path / "out.####.png"
     assert app.main([*state.command(str(out)), "--quiet"]) == 0
     assert len(list(tmp_path.glob("out.*.png"))) == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="permissions are the folder's there")
+def test_screenshots_of_private_frames_are_private(hand, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in").mkdir()
+    shot = make.write_sequence(tmp_path / "in", [1, 2])
+    (tmp_path / "in" / "shot.0002.exr").chmod(0o600)
+    hand.viewer.do("open", shot)
+    for key in "svv":
+        hand.press(key)
+        hand.look()
+    made = sorted(tmp_path.glob("wgmb-001.*"))
+    assert [path.suffix for path in made] == [".exr", ".mp4", ".png"]
+    assert not any(path.stat().st_mode & 0o077 for path in made)
 
 
 def test_screenshot_and_recording(hand, tmp_path, monkeypatch):

@@ -2,7 +2,8 @@
 
 A file is written beside its name under a temporary one, which tells the host and the process
 that write it, and is then renamed. Several processes, on several hosts, may therefore write
-into one folder: whoever opens a finished name reads a whole file.
+into one folder: whoever opens a finished name reads a whole file. A file that is made of others
+is readable by nobody who may not read them.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import os
 import re
 import secrets
 import socket
-from collections.abc import Callable, Collection
+import stat
+import sys
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 from . import leftovers
@@ -25,19 +28,54 @@ try:
 except ImportError:  # Windows, where a file that is open cannot be removed
     fcntl = None
 
+PUBLIC = 0o666  # permissions of a file that is made of no other; the umask takes some away
 _MOST_OF_A_NAME = 190  # bytes of it in the temporary one: file systems take 255 in all
 _HOST = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())[:32] or "host"
 _TEMPORARY = re.compile(r"\.(?P<name>.+)\.(?P<host>\w+)-(?P<process>\d+)-[0-9a-f]{8}\.part", re.S)
 
 
-def write_file(path: Path, *pieces: Buffer, temporary: Path | None = None) -> None:
+def mode_of(folder: Path, inputs: Iterable[Path]) -> int:
+    """Permissions, before the umask, of a file in `folder` that is made of the files `inputs`.
+
+    Everybody else may read it who may read each of them; its owner may always. Others than files,
+    such as pipes, count for nothing. Where the new file is of another group than an input, that
+    group may read it if all others may read the input.
+    """
+    if os.name == "nt":  # permissions are the folder's there
+        return PUBLIC
+    group, readers = _group_in(folder), 0o044
+    for path in inputs:
+        try:
+            found = os.stat(path)
+        except OSError:  # it is not there yet, or is no file
+            continue
+        if stat.S_ISREG(found.st_mode):
+            all_others = found.st_mode >> 3 & found.st_mode & 0o004
+            readers &= found.st_mode if found.st_gid == group else all_others << 3 | all_others
+    return 0o600 | readers | readers >> 1
+
+
+def _group_in(folder: Path) -> int:
+    """The group of new files in a folder."""
+    try:
+        found = os.stat(folder)
+    except OSError:  # it is going to be made
+        return os.getegid()
+    inherits = sys.platform != "linux" or found.st_mode & stat.S_ISGID
+    return found.st_gid if inherits else os.getegid()
+
+
+def write_file(
+    path: Path, *pieces: Buffer, temporary: Path | None = None, mode: int = PUBLIC
+) -> None:
     """Put the pieces, one after the other, at `path`: under a temporary name, then renamed.
 
-    Raises OSError, whose text names `path`, and then nothing has changed.
+    `mode`: the permissions; `mode_of` has those of a file that is made of others. Raises OSError,
+    whose text names `path`, and then nothing has changed.
     """
     temporary = temporary or temporary_name(path)
     try:
-        with os.fdopen(create(temporary), "wb") as file:
+        with os.fdopen(create(temporary, mode), "wb") as file:
             for piece in pieces:
                 file.write(piece)
             file.flush()
@@ -65,17 +103,18 @@ def _begin(name: str) -> str:
     return encoded[:_MOST_OF_A_NAME].decode(errors="ignore")
 
 
-def create(temporary: Path) -> int:
+def create(temporary: Path, mode: int = PUBLIC) -> int:
     """Create the file and open it for writing; returns its descriptor.
 
-    Raises FileExistsError where there is anything under that name, a link too. While the
-    descriptor is open the file is locked, so that other processes see that it is in use.
+    `mode`: see `write_file`. Raises FileExistsError where there is anything under that name, a link
+    too. While the descriptor is open the file is locked, so that other processes see that it is in
+    use.
     """
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL
     flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
     leftovers.add(temporary, lambda: temporary.unlink(missing_ok=True))
     try:
-        descriptor = os.open(temporary, flags, 0o666)
+        descriptor = os.open(temporary, flags, mode)
     except BaseException:  # what is there is not ours
         leftovers.forget(temporary)
         raise

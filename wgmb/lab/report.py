@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from ..io.atomic import write_file
+from ..io.atomic import mode_of, write_file
 from ..metrics import (
     FLIP_GAIN,
     METRICS,
@@ -36,15 +36,19 @@ _COLORS = 10  # in report.html
 _TEMPLATE = Path(__file__).with_name("report.html")
 
 
-def write(report: Report, path: Path) -> list[Path]:
-    """Write the page to `path`, and .json and .csv beside it; returns the three paths."""
+def write(report: Report, path: Path, inputs: Iterable[Path] = ()) -> list[Path]:
+    """Write the page to `path`, and .json and .csv beside it; returns the three paths.
+
+    `inputs`: the files whose pictures it has; see atomic.mode_of.
+    """
+    mode = mode_of(path.parent, inputs)
     written = {
         path: page(report),
         path.with_suffix(".json"): json.dumps(as_json(report), indent=1) + "\n",
         path.with_suffix(".csv"): as_csv(report),
     }
     for file, text in written.items():
-        write_file(file, text.encode())
+        write_file(file, text.encode(), mode=mode)
     return list(written)
 
 

@@ -56,7 +56,8 @@ class Output:
     input's. `views`: names of the views for which %V in the pattern stands; each has its own file
     or video. `display`: the display for PNG, JPEG, TIFF and videos; sRGB by default. `window`: the
     data window of an EXR may "grow" with the streaks, or "keep" its size; stills and videos hold
-    the display window. `since`: older files [ns since 1970] count as unfinished. InputError for a
+    the display window. `since`: older files [ns since 1970] count as unfinished. No file is
+    readable by anybody who may not read all `inputs` and the frame's own file. InputError for a
     name or a setting that does not fit, and for existing files.
     """
 
@@ -108,7 +109,9 @@ class Output:
             raise InputError(
                 f"output {pattern}: {len(numbers)} frames need a pattern such as out.####.exr"
             )
-        is_output = self._check_names(list(inputs), is_video)
+        inputs = list(inputs)
+        is_output = self._check_names(inputs, is_video)
+        self._modes = {folder: atomic.mode_of(folder, inputs) for folder in is_output}
         for path in is_output:
             atomic.sweep(path, is_output[path])
         if is_video:
@@ -267,8 +270,9 @@ class Output:
         """Write the file of `view`, or of all."""
         first = results[0]
         if self._videos:
-            aspect = first.source.pixel_aspect
-            self._videos[view].add(first.displayed, self._to_display(first), aspect)
+            aspect, video = first.source.pixel_aspect, self._videos[view]
+            video.mode = self._mode(video.path, results)
+            video.add(first.displayed, self._to_display(first), aspect)
             return
         path = self.path(first.source.number, view)
         text = record.blank(self._expected(made_of))
@@ -279,7 +283,13 @@ class Output:
             raise InputError(f"{path} was written by another process during this run")
         self._under_way = atomic.temporary_name(path)
         pieces = record.seal(data, text) if self._has_record else [data]
-        atomic.write_file(path, *pieces, temporary=self._under_way)
+        mode = self._mode(path, results)
+        atomic.write_file(path, *pieces, temporary=self._under_way, mode=mode)
+
+    def _mode(self, path: Path, results: Sequence[Result]) -> int:
+        """Permissions of a file that is made of the inputs, and of these results' files."""
+        sources = [result.source.path for result in results]
+        return self._modes[path.parent] & atomic.mode_of(path.parent, sources)
 
     def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
         """The file at `path`, with the record's text."""

@@ -125,6 +125,7 @@ def _write_video(
     encoding.check_pause(path, wanted.longest, wanted.tick)
     path.parent.mkdir(parents=True, exist_ok=True)
     atomic.sweep(path.parent, [path.name])
+    mode = atomic.mode_of(path.parent, inputs)
     rate, tick = 1 / wanted[0].interval, wanted.tick
     form = VideoFormat(encoding, coding, reader.size, rate, tick, reader.facts)
     others = None
@@ -133,7 +134,7 @@ def _write_video(
         others = OtherStreams(reader.path, reader.index, source.clock, keeps_pitch)
     coded = coded_form(coding)
     if output.resume and encoding.codec != "gif":  # which has one palette after another
-        segments = Segments(path, form, wanted.times, made_of)
+        segments = Segments(path, form, wanted.times, made_of, mode)
         try:
             for numbers in segments.to_do():
                 part = source.frames(wanted[numbers.start : numbers.stop], coded)
@@ -142,7 +143,9 @@ def _write_video(
         finally:
             segments.release()
     said, temporary = record.blank(made_of), atomic.temporary_name(path)
-    writer = VideoWriter(path, temporary, form, None, others, record=said, is_new=not there)
+    writer = VideoWriter(
+        path, temporary, form, None, others, record=said, is_new=not there, mode=mode
+    )
     run(source.frames(wanted, coded), VideoSink(writer), progress=progress)
     remove_left(path)
     return [*lost, *writer.left_out]

@@ -14,7 +14,7 @@ from .. import interpreter
 from ..color.srgb import linear
 from ..errors import Error, InputError
 from ..io import exr, leftovers, stills
-from ..io.atomic import temporary_name, write_file
+from ..io.atomic import mode_of, temporary_name, write_file
 from ..io.record import KEY
 from ..video.write.frames import FrameVideo
 from .draw.draw_thread import DrawThread
@@ -92,12 +92,14 @@ class Actions:
 
     def _screenshot(self, state: State) -> None:
         path, settings = _free(".png", ".exr"), state.toml()
-        write_file(path, stills.encode(self._displayed(), ".png", 8, settings))
+        mode = mode_of(path.parent, state.files)
+        write_file(path, stills.encode(self._displayed(), ".png", 8, settings), mode=mode)
         linear = self._stage.download()
         rgba = np.ones((*linear.shape[:2], 4), np.float32)
         rgba[..., : linear.shape[2]] = linear
         whole = path.with_suffix(".exr")
-        write_file(whole, exr.encode(exr.new(rgba, self._stage.chromaticities | {KEY: settings})))
+        made = exr.new(rgba, self._stage.chromaticities | {KEY: settings})
+        write_file(whole, exr.encode(made), mode=mode)
         self._say(f"saved {path.name} and {whole.name}")
 
     def _record(self, state: State) -> None:
@@ -105,6 +107,7 @@ class Actions:
             path = _free(".mp4")
             text = f"wgmb {state.toml()}"
             self._video = FrameVideo(path, temporary_name(path), rate(state), text)
+            self._video.mode = mode_of(path.parent, state.files)
             return
         self.close()
 

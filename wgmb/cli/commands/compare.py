@@ -186,6 +186,7 @@ def compare(
         if found := crossings(report, case):
             report.tables.append(found)
     report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
-    write(report, output)
+    files = (file for name in inputs or () for file in input.open(name).dependencies.every())
+    write(report, output, [*(truth or ()), *baselines.values(), *files])
     tell(f"-> {output}")
     return 0

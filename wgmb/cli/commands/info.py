@@ -14,7 +14,7 @@ from ...errors import InputError, counted
 from ...extras import needed_by
 from ...frame import bad_colors
 from ...io import stills
-from ...io.atomic import write_file
+from ...io.atomic import mode_of, write_file
 from ...io.frame_numbers import frame_list
 from ...output.names import refuse_inputs
 from ...pipeline.blur import Blur
@@ -165,6 +165,7 @@ def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tu
     if output is not None:
         full = max(float(nearly), 1.0)
         picture = motion_picture(motion, full)
-        write_file(output, stills.encode(picture, output.suffix, 8, "motion"))
+        mode = mode_of(output.parent, clip.dependencies.every())
+        write_file(output, stills.encode(picture, output.suffix, 8, "motion"), mode=mode)
         lines.append(("motion", f"{output} (full brightness: {full:.1f} px per frame)"))
     return lines

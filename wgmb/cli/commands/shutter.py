@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ... import charts
 from ...errors import InputError
-from ...io.atomic import write_file
+from ...io.atomic import mode_of, write_file
 from ...shutter import OVERLAPS
 from ..options import ShutterOptions, Shutters
 from ..terminal import out
@@ -43,7 +43,8 @@ def shutter(
     if shutter.shutter is None:
         shutter = replace(shutter, shutter=OVERLAPS.get(shutter.curve or "box", 360.0))
     made, name = shutter.resolved().make(), shutter.curve or "box"
-    write_file(output, charts.svg(*charts.shutter_charts(made, Path(name).name)).encode())
+    drawing = charts.svg(*charts.shutter_charts(made, Path(name).name))
+    write_file(output, drawing.encode(), mode=mode_of(output.parent, [Path(name)]))
     total = made.overlap(np.linspace(0, 1, 2001))
     low, high = round(float(total.min()), 3), round(float(total.max()), 3)
     even = high - low < 0.01

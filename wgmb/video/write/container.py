@@ -39,12 +39,19 @@ class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
     `metadata`: texts of the whole file; what it cannot hold of them is in `left_out`. `record`:
-    see io/record.py; it gets its seal if the file `is_complete`. `is_new`, which may be set: no
-    file of another process is replaced. OSError, whose text names `path`, if it cannot be written.
+    see io/record.py; it gets its seal if the file `is_complete`. `mode`: see atomic.mode_of.
+    `is_new`, which may be set: no file of another process is replaced. OSError, whose text names
+    `path`, if it cannot be written.
     """
 
     def __init__(
-        self, path: Path, temporary: Path, suffix: str, metadata: dict[str, str], record: str = ""
+        self,
+        path: Path,
+        temporary: Path,
+        suffix: str,
+        metadata: dict[str, str],
+        record: str = "",
+        mode: int = atomic.PUBLIC,
     ):
         self.path, self.temporary = path, temporary
         self.is_new, self.is_complete = False, True
@@ -54,7 +61,7 @@ class NewFile:
         self._container: OutputContainer | None = None
         self._lock: int | None = None
         try:
-            self._lock = atomic.create(temporary)  # its own file, which nobody else writes to
+            self._lock = atomic.create(temporary, mode)  # its own file
             kind = CONTAINERS[suffix]
             options = options | _MUXING.get(kind, {})
             self._container = av.open(
@@ -161,8 +168,9 @@ class VideoFile(NewFile):
         format: VideoFormat,
         metadata: dict[str, str] | None = None,
         record: str = "",
+        mode: int = atomic.PUBLIC,
     ):
-        super().__init__(path, temporary, format.encoding.suffix, metadata or {}, record)
+        super().__init__(path, temporary, format.encoding.suffix, metadata or {}, record, mode)
         self.has_views = views.are_stated(format.facts)
         self._base, self._rate, self._packets = format.base, format.rate, 0
         self._late_times = format.encoding.encoder.name == "libx265"

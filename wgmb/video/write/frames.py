@@ -46,7 +46,8 @@ class FrameVideo:
     256 colours per frame, dithered, and delays in steps of 1/100 s, which vary by a step to keep
     the mean frame rate. `comment`: a text for players. `record`, which may be set until the first
     frame: see io/record.py. `display`: names of the display's colour space, for the tags.
-    `encoding`: see encoders.chosen; by default that of the suffix.
+    `encoding`: see encoders.chosen; by default that of the suffix. `mode`, which may be set until
+    the first frame: the permissions, see atomic.mode_of.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class FrameVideo:
         encoding: Encoding | None = None,
     ):
         self.path, self.temporary = path, temporary
-        self.record, self._texts = "", {"comment": comment}
+        self.record, self._texts, self.mode = "", {"comment": comment}, atomic.PUBLIC
         self._encoding = encoding or chosen(path)
         check_rate(path, fps, *(() if self._encoding.codec == "gif" else (_RATES,)))
         self.fps = fps.limit_denominator(FINEST_RATE)
@@ -93,7 +94,12 @@ class FrameVideo:
             facts = Facts(pixel_aspect)
             form = VideoFormat(self._encoding, self._coding, size, self.fps, 1 / self.fps, facts)
             self._video = VideoWriter(
-                self.path, self.temporary, form, self._texts, record=self.record
+                self.path,
+                self.temporary,
+                form,
+                self._texts,
+                record=self.record,
+                mode=self.mode,
             )
         self._video.add_rgb(rgb, self._frames / self.fps)
         self._frames += 1

@@ -45,7 +45,8 @@ class Segments:
 
     `made_of`: what pictures depend on (settings, inputs); segments that were made of anything else
     are made again. Use: for every range of numbers in `to_do`, `begin` it, add its pictures, close
-    it; then `join`; `release` in any case. InputError for a GIF, which has no segments.
+    it; then `join`; `release` in any case. `mode`: permissions of the video and of the segments,
+    see atomic.mode_of. InputError for a GIF, which has no segments.
     """
 
     def __init__(
@@ -54,13 +55,14 @@ class Segments:
         format: VideoFormat,
         times: Sequence[Fraction],
         made_of: dict[str, Any],
+        mode: int = atomic.PUBLIC,
     ):
         encoding = format.encoding
         if encoding.codec == "gif":
             raise InputError(f"output {path}: a GIF cannot be resumed")
         self.path, self.folder = path, folder_of(path)
         self._claim: tuple[Path, int] | None = None
-        self._format, self._times = format, times
+        self._format, self._times, self._mode = format, times, mode
         per = max(round(SECONDS * format.rate), 1)
         self._ranges = [
             range(n, min(n + per, len(times))) for n in range(0, len(times), per)
@@ -87,7 +89,8 @@ class Segments:
         index = self._ranges.index(numbers)
         path = self._file(index)
         path.with_suffix(".json").unlink(missing_ok=True)  # of what it is going to replace
-        return Segment(self, index, VideoWriter(path, atomic.temporary_name(path), self._format))
+        temporary = atomic.temporary_name(path)
+        return Segment(self, index, VideoWriter(path, temporary, self._format, mode=self._mode))
 
     def join(self, record: str = "", others: OtherStreams | None = None) -> list[str]:
         """Write the video, with `others` beside its pictures; return what is left out, in words.
@@ -96,7 +99,9 @@ class Segments:
         """
         texts = others.metadata if others else {}
         temporary = atomic.temporary_name(self.path)
-        file = NewFile(self.path, temporary, self._format.encoding.suffix, texts, record)
+        file = NewFile(
+            self.path, temporary, self._format.encoding.suffix, texts, record, self._mode
+        )
         file.has_views = views.are_stated(self._format.facts)
         try:
             left_out = self._written(file, others)
@@ -211,7 +216,8 @@ class Segments:
         """Write the record of a segment that is in place."""
         path = self._file(index)
         text = record.blank(self._content(index) | _sum(path))
-        atomic.write_file(path.with_suffix(".json"), *record.seal(text.encode(), text))
+        sealed = record.seal(text.encode(), text)
+        atomic.write_file(path.with_suffix(".json"), *sealed, mode=self._mode)
 
     def _content(self, index: int) -> dict[str, Any]:
         numbers = self._ranges[index]

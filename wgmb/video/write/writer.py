@@ -33,6 +33,7 @@ class VideoWriter:
     that does not start. `others`: streams to put beside the pictures, with their texts and
     dates; what of them the file cannot hold is in `left_out`. `record`: see io/record.py. `is_new`:
     OSError, when it is closed, where another process has made a file of this name meanwhile.
+    `mode`: its permissions, see atomic.mode_of.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class VideoWriter:
         *,
         record: str = "",
         is_new: bool = False,
+        mode: int = atomic.PUBLIC,
     ):
         if is_gif := format.encoding.codec == "gif":
             check_rate(path, format.rate)
@@ -55,7 +57,7 @@ class VideoWriter:
         self._by = VideoReformatter()
         self._palettes = Palettes(*format.padded) if is_gif else None
         texts = (metadata or {}) | (others.metadata if others else {})
-        self.file = VideoFile(path, temporary, format, texts, record)
+        self.file = VideoFile(path, temporary, format, texts, record, mode)
         self.left_out = [*format.left_out, *self.file.left_out]
         self.file.is_new = is_new
         try:

@@ -203,6 +203,14 @@ class State:
         return max((n for n in numbers if n <= self.frame), default=min(numbers))
 
     @property
+    def files(self) -> list[Path]:
+        """The files whose pictures are shown; none of a built-in scene."""
+        if self.is_scene or self.is_video:
+            return [] if self.is_scene else [Path(self.source)]
+        numbers = frame_numbers.frame_numbers(self.frames)
+        return [frame_numbers.frame_path(self.source, n) for n in numbers]
+
+    @property
     def moment(self) -> float:
         """The moment at which it is looked at what is perceived [frame intervals].
 
