@@ -5,6 +5,7 @@ import json
 import os
 import re
 from dataclasses import replace
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import make_frames as make
-from wgmb import METHODS, Frame, Shutter
+from wgmb import METHODS, Clip, Frame, Shutter
 from wgmb.errors import InputError
 from wgmb.lab import (
     cases,
@@ -326,7 +327,7 @@ def test_files_are_compared_with_the_frames_around_them(tmp_path, capsys):
     truth = shot.replace("####", "0002")
     Path(truth).chmod(0o600)
     said = make.inside(
-        capsys, "compare", "--truth", truth, "--inputs", shot, "--frame", 2, "--methods", "tap",
+        capsys, "compare", "--truth", truth, "--inputs", shot, "--frames", 2, "--methods", "tap",
         "--ladder", "2", "--samples", 4, "--peer", f"other={truth}", "--rounds", 1,
         "-o", tmp_path / "r.html",
     )  # fmt: skip
@@ -346,17 +347,19 @@ def test_three_files_are_before_here_and_after(tmp_path):
     shot = make.write_sequence(tmp_path, range(1, 4))
     files = [shot.replace("####", f"{n:04d}") for n in (1, 2, 3)]
     truth = [Path(files[1])]
-    three = cases.clip_case("x", Shutter(180), files, None, truth, {})
-    one = cases.clip_case("x", Shutter(180), [shot], 2, truth, {})
+    three = cases.clip_case("x", Shutter(180), files, truth, {})
+    one = cases.clip_case("x", Shutter(180), [shot], truth, {}, partial(Clip, frames="2"))
     for made in (three.frame, three.frame.prev, three.frame.next):
         assert made is not None
     for a, b in ((three.frame.prev, one.frame.prev), (three.frame.next, one.frame.next)):
         assert a is not None and b is not None
         np.testing.assert_array_equal(a.color, b.color)
-    with pytest.raises(InputError, match="no frame 7"):
-        cases.clip_case("x", Shutter(180), [shot], 7, truth, {})
+    with pytest.raises(InputError, match="missing frame 7"):
+        cases.clip_case("x", Shutter(180), [shot], truth, {}, partial(Clip, frames="7"))
+    with pytest.raises(InputError, match="got frames 1-3, but a truth is of one; `frames`"):
+        cases.clip_case("x", Shutter(180), [shot], truth, {})
     with pytest.raises(InputError, match="one file or three, got 2"):
-        cases.clip_case("x", Shutter(180), files[:2], None, truth, {})
+        cases.clip_case("x", Shutter(180), files[:2], truth, {})
 
 
 def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
@@ -364,7 +367,7 @@ def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
     files = [Path(shot.replace("####", f"{n:04d}")) for n in (1, 2, 3)]
 
     def case(*truth):
-        return cases.clip_case("x", Shutter(180), [shot], 2, truth, {})
+        return cases.clip_case("x", Shutter(180), [shot], truth, {}, partial(Clip, frames="2"))
 
     one, two = case(files[1]), case(files[0], files[2])
     assert one.floor is None and "noise is unknown" in one.about
@@ -379,7 +382,7 @@ def test_two_halves_of_a_true_picture_tell_its_noise(tmp_path, capsys):
     with pytest.raises(InputError, match="of one size, got 64 x 48 and 5 x 4"):
         case(files[0], small)
     said = make.inside(
-        capsys, "compare", "--truth", *files[::2], "--inputs", shot, "--frame", 2, "--methods",
+        capsys, "compare", "--truth", *files[::2], "--inputs", shot, "--frames", 2, "--methods",
         "tap", "--ladder", "2", "--samples", 2, "--rounds", 1, "-o", tmp_path / "r.html",
     )  # fmt: skip
     assert said[0] == 0

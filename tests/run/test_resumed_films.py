@@ -2,6 +2,8 @@
 
 import os
 
+import imageio.v3 as iio
+import numpy as np
 import pytest
 
 import make_frames as make
@@ -104,3 +106,21 @@ def test_a_video_of_a_scene_is_done_too(tmp_path, capsys):
     for frames, said in (("0-2", "frames in"), ("0-2", "already done"), ("0-3", "otherwise")):
         _, _, err = make.inside(capsys, "render", *words, "--frames", frames)
         assert said in err
+
+
+def test_frames_are_written_in_the_order_that_is_asked_for(tmp_path, capsys, shot):
+    for name, frames in (("up.mkv", "2-4"), ("down.mkv", "4-2")):
+        code, err = blur(capsys, shot, tmp_path / name, "--frames", frames)
+        assert code == 0, err
+    up, down = (iio.imread(tmp_path / name, plugin="pyav") for name in ("up.mkv", "down.mkv"))
+    apart = np.abs(up.astype(int)[:, None] - down[None]).mean(axis=(2, 3, 4))
+    assert apart.argmin(axis=1).tolist() == [2, 1, 0]
+
+
+@pytest.mark.parametrize("frames", ["1-0", "0-2x2", "1,0"])
+def test_frames_of_a_video_are_an_ascending_range(tmp_path, capsys, shot, frames):
+    blur(capsys, shot, tmp_path / "v.mkv", "--frames", "1-3")
+    words = ("blur", tmp_path / "v.mkv", "-o", tmp_path / "o.mp4", "--flow", "none")
+    code, _, err = make.inside(capsys, *words, "--frames", frames)
+    assert code == 2 and not (tmp_path / "o.mp4").exists()
+    assert f"must be one ascending range such as 1-3, got {frames}" in err

@@ -16,7 +16,6 @@ _OTHERWISE = {
     "device": "--adapter",
     "color_in": "--color-in",
     "fps_in": "--fps-in",
-    "number": "--frame",
     "passes": "--passes",
     "program": "--as",
     "sharp": "--sharp",

@@ -194,13 +194,13 @@ def _of_halves(case: Case, halves: Sequence[np.ndarray]) -> Case:
 
 
 def clip_case(
-    name: str, shutter: Shutter, inputs: Sequence[str], number: int | None,
-    truth: Sequence[Path], peers: dict[str, Path], open_clip: Callable[[str], Clip] = Clip,
+    name: str, shutter: Shutter, inputs: Sequence[str], truth: Sequence[Path],
+    peers: dict[str, Path], open_clip: Callable[[str], Clip] = Clip,
 ) -> Case:  # fmt: skip
     """A case of rendered frames on disk.
 
-    `inputs`: a pattern, with the `number` of its frame, or the file of one frame, or the files
-    of the frames before, here and after. `truth`: one file, or two independent halves of it.
+    `inputs`: a pattern of which `open_clip` chooses one frame, or the file of one frame, or the
+    files of the frames before, here and after. `truth`: one file, or two independent halves of it.
     """
     if len(truth) not in (1, 2):
         raise InputError(f"truth must be one file or two halves of it, got {len(truth)}")
@@ -212,14 +212,13 @@ def clip_case(
         frame = replace(here, prev=before, next=after)
     elif len(inputs) == 1:
         clip = open_clip(inputs[0])
-        if number is None and len(clip.numbers) > 1:
+        if len(clip.numbers) > 1:
             raise InputError(
-                f"{inputs[0]} has frames {frame_list(clip.numbers)}; `number` chooses one"
+                f"{inputs[0]}: got frames {frame_list(clip.numbers)}, but a truth is of one; "
+                "`frames` chooses it"
             )
-        wanted = clip.numbers[0] if number is None else number
-        if wanted not in clip.numbers:
-            raise InputError(f"{inputs[0]} has no frame {wanted}")
-        frame = clip.with_neighbours(clip.source(wanted), extent=EVERYWHERE, reach=2)
+        here = clip.source(clip.numbers[0])
+        frame = clip.with_neighbours(here, extent=EVERYWHERE, reach=2)
     else:
         raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}

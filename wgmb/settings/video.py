@@ -171,10 +171,12 @@ class VideoSettings(FlowSettings):
                 raise InputError("choose either `frames`, or `begin` and `end`")
             numbers = frame_numbers(frames)
             there = f"{reader.path} has pictures 0 to {len(reader) - 1}"
+            if numbers != list(range(numbers[0], numbers[-1] + 1)):
+                raise InputError(
+                    f"frames of a video must be one ascending range such as 1-3, got {frames}"
+                )
             if not 0 <= numbers[0] <= numbers[-1] < len(reader):
                 raise InputError(f"frames {frames}: {there}")
-            if numbers != list(range(numbers[0], numbers[-1] + 1)):
-                raise InputError(f"frames of a video must be one range, got {frames}")
             first = reader.times[numbers[0]]
             end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
         begin = reader.begin(others) if first is None else first

@@ -101,7 +101,6 @@ def compare(
     antialias: int = 3,
     truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
-    frame: int | None = None,
     peer: tuple[str, ...] = (),
     experiment: str | None = None,
     adapter: Adapter = None,
@@ -112,7 +111,7 @@ def compare(
 
     Example: wgmb compare crossing fence:speed=5 --methods tap,reproject -o report.html
 
-    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frame 2 -o report.html
+    Example: wgmb compare --truth t.exr --inputs 'shot.####.exr' --frames 2 -o report.html
 
     Parameters
     ----------
@@ -130,9 +129,8 @@ def compare(
         Ground truth of the blurred frame: one file, or two rendered with half the samples and
         different seeds, whose mean is the truth and whose difference gives the noise floor.
     inputs
-        Rendered frames: a pattern, or the files of the frame before, this one and the next.
-    frame
-        Frame number of the truth.
+        Rendered frames: a pattern, of which --frames names the frame of the truth, or the files of
+        the frame before, this one and the next.
     peer
         NAME=FILE: the frame as blurred by another program; may be repeated.
     experiment
@@ -175,8 +173,8 @@ def compare(
     if truth is not None and inputs:
         name = truth[0].parent.name or truth[0].stem
         for degrees, exposed in comparison.labelled_shutters(shutter).items():
-            cases.append(partial(clip_case, f"{name}, {degrees}", exposed, inputs, frame,
-                                 truth, baselines, input.open))  # fmt: skip
+            cases.append(partial(clip_case, f"{name}, {degrees}", exposed, inputs, truth,
+                                 baselines, input.open))  # fmt: skip
     able = (
         candidates if comparison.methods or scene else [c for c in candidates if not c.needs_scene]
     )
