@@ -11,7 +11,7 @@ import wgpu
 import sampler
 import standard
 import tiers
-from wgmb import gpu
+from wgmb import gpu, interpreter
 
 np.seterr(all="raise", under="ignore")
 collect_ignore = ["blender"]  # test_blender.py runs them in Blender's own Python
@@ -20,6 +20,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # the workers have shared out the cores
 
 os.environ.pop("OCIO", None)  # a config of whoever runs the tests
 pytest.register_assert_rewrite("viewer_hand")
+interpreter.name_runtime_folder()  # as `wgmb` does; the programs that tests start inherit it
 standard.record()  # every kernel that a test makes; they are sent through Dawn in the end
 
 # Files that take longest are begun first, so that all workers end at about the same time; those

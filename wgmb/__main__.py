@@ -17,6 +17,7 @@ def _leave(*_) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     interpreter.leave_current_folder()
+    interpreter.name_runtime_folder()
     interpreter.handle_signals(_leave)
     try:
         from .cli.app import run

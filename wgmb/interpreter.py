@@ -40,6 +40,17 @@ def leave_current_folder() -> None:
     os.environ.update(kept)
 
 
+def name_runtime_folder() -> None:
+    """Name a runtime folder where the environment names none: Wayland's library, which drivers
+    load, complains on stderr otherwise.
+
+    It is no folder, so nobody can offer a display there. A program calls this before it starts a
+    thread: the environment is the whole process's, and a library that changes it may end its host.
+    """
+    if sys.platform == "linux" and not os.environ.get("XDG_RUNTIME_DIR"):
+        os.environ["XDG_RUNTIME_DIR"] = os.devnull
+
+
 def _is_current(folder: str) -> bool:
     """Return True for the current folder, unless wgmb itself is installed there."""
     try:

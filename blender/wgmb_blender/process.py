@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -88,12 +89,15 @@ class Process:
         path = [folder for folder in sys.path if folder and Path(folder).resolve() != here]
         path.append(str(Path(__file__).parent))
         words = [sys.executable, "-I", "-c", _START, json.dumps(path)]
+        # Without a runtime folder, drivers would complain among the errors.
+        folder = os.environ.get("XDG_RUNTIME_DIR") or os.devnull
         try:
             return subprocess.Popen(
                 words,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
+                env=os.environ | {"XDG_RUNTIME_DIR": folder},
                 creationflags=_HIDDEN,
             )
         except OSError as error:

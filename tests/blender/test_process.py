@@ -45,6 +45,15 @@ def test_blender_itself_loads_none_of_what_blurs(tmp_path, kind):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_its_errors_are_empty_where_no_runtime_folder_is_named(monkeypatch):
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    one = Process()
+    assert one.ask("adapters").result()
+    one._errors.seek(0)
+    assert one._errors.read() == b""
+    one.close()
+
+
 class Dying(Process):
     """Ended from outside where it should blur frame 5, as a driver would end it."""
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import tempfile
 from contextlib import contextmanager, suppress
 from functools import cache
 
@@ -32,8 +31,7 @@ def adapters() -> list[wgpu.GPUAdapter]:
     if _draws_with_opengl():
         with suppress(RuntimeError):  # wgpu has been used already, and it is too late
             set_instance_extras(backends=["Vulkan", "Metal", "DX12"])
-    with _runtime_folder():
-        found = wgpu.gpu.enumerate_adapters_sync()
+    found = wgpu.gpu.enumerate_adapters_sync()
 
     def rank(adapter: wgpu.GPUAdapter) -> tuple[bool, int]:
         kind = adapter.info["adapter_type"]
@@ -54,23 +52,6 @@ def _draws_with_opengl() -> bool:
         if current():
             return True
     return False
-
-
-@contextmanager
-def _runtime_folder():
-    """Name a runtime folder where the process has none: Mesa complains on stderr otherwise."""
-    name = "XDG_RUNTIME_DIR"
-    before = os.environ.get(name)
-    if before:
-        yield
-        return
-    os.environ[name] = tempfile.gettempdir()
-    try:
-        yield
-    finally:
-        os.environ.pop(name)
-        if before is not None:
-            os.environ[name] = before
 
 
 def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
