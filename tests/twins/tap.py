@@ -22,11 +22,10 @@ def source(motion, y, x, t):
 
 def change_along(motion, y, x, v):
     """Of the velocity along itself, from a quarter interval either way; at most the velocity."""
-    height, width = motion.shape[:2]
 
     def velocity(at):
-        column, row = np.clip(np.floor(at), 0, (width - 1, height - 1)).astype(int)
-        return (motion[row, column, 2:] - motion[row, column, :2]) / 2
+        between = bilinear(motion, *at)
+        return (between[2:] - between[:2]) / 2
 
     here = np.array([x, y]) + 0.5
     change = 2 * (velocity(here + v / 4) - velocity(here - v / 4))

@@ -61,7 +61,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
     var source = Trajectory(-trajectory.velocity, vec2f(0.0));
-    if !PUBLISHED { source = backwards(trajectory, x); }
+    if !PUBLISHED { source = backwards(motion, trajectory, x); }
     let here = uv + texel * displacement(source, middle);
     var sum = weights.x * textureSampleLevel(color, linear, here, 0.0);
     var total = 0.0;

@@ -41,11 +41,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let texel = 1.0 / vec2f(frame.size);
     let uv = x * texel;
     var source = Trajectory(-trajectory.velocity, vec2f(0.0));
-    if CURVED && !PUBLISHED { source = backwards(trajectory, x); }
+    if CURVED && !PUBLISHED { source = backwards(motion, trajectory, x); }
     var bent = trajectory5_from(source);
     if FIVE_POSITIONS {
         let told = trajectory_with(textureLoad(motion, id.xy, 0), textureLoad(bends, id.xy, 0).x);
-        bent = backwards5(told, x);
+        bent = backwards5(motion, told, x);
     }
     var sum = vec4f(0.0);
     var total = 0.0;
