@@ -21,7 +21,7 @@ BUILT_IN = {
     "fence": {"speed": 6},
     "hdr": {"speed": 3},
 }
-BEHIND_DECIBELS = {("shaken", 90): 0.4}  # 36.56 dB beside the 36.92 of `tap`, which follows accelerations
+BEHIND_DECIBELS = {("shaken", 90): 0.4}  # 36.6 dB beside 36.9 of `tap`
 BEHIND = {("wires", 180): 1.08}  # FLIP of `gather`, 0.0167, to that of `reproject`, 0.0156
 
 
