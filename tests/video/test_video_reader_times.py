@@ -16,6 +16,7 @@ from wgmb.video.read.decoder import decoded
 from wgmb.video.read.packets import completed
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Timeline, Times
+from wgmb.video.write.scheduling import kept_scheduling
 
 pytestmark = pytest.mark.fast
 
@@ -207,7 +208,8 @@ def raw(path, kind, codec, rate, **more):
     pixels = "yuvj420p" if codec == "mjpeg" else "yuv420p"
     frames = [clips.frame(clips.planes(n, size), pixels) for n in range(24)]
     rate = Fraction(rate)
-    return clips.write(path, frames, codec=codec, pixels=pixels, kind=kind, rate=rate, **more)
+    with kept_scheduling():
+        return clips.write(path, frames, codec=codec, pixels=pixels, kind=kind, rate=rate, **more)
 
 
 @pytest.mark.parametrize("rate", ["24000/1001", "12", "25", "60"])

@@ -11,7 +11,7 @@ import lzma
 import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -164,6 +164,9 @@ def tiff(data: bytes) -> bytes:
             continue
         limits.held(f"values of tag {tag}", values, _SIZES.get(kind, 1), len(data))
         limits.held(f"values of tag {tag}", values, 1, _MOST_SEGMENTS)
+        if (size := values * _SIZES.get(kind, 1)) > place:  # they lie elsewhere in the file
+            offset = struct.unpack_from(order + ("Q" if big else "I"), data, each + entry - place)
+            _inside(f"tag {tag}", offset, (size,), len(data))
         kept[tag] = data[each : each + entry]
     new = struct.pack(count_form, len(kept)) + b"".join(kept[tag] for tag in sorted(kept))
     head = data[:place] + struct.pack(order + ("Q" if big else "I"), padded := len(data) + 16)
@@ -181,6 +184,19 @@ def tiff_segment(page: Any) -> int:
     else:
         width, rows = page.imagewidth, min(page.rowsperstrip, page.imagelength)
     return rows * -(-width * samples * page.bitspersample // 8)
+
+
+def tiff_segments_held(page: Any, stored: int) -> None:
+    """ValueError where a strip or tile of a page of tifffile ends beyond a file of so many bytes.
+
+    The list of tags that `tiff` puts behind the file would be read as pixels.
+    """
+    _inside("its strips or tiles", page.dataoffsets, page.databytecounts, stored)
+
+
+def _inside(name: str, offsets: Iterable[int], counts: Iterable[int], stored: int) -> None:
+    if any(offset + count > stored for offset, count in zip(offsets, counts, strict=False)):
+        raise ValueError(f"cut off: {name} would end beyond its {stored} bytes")
 
 
 def bound_segments(page: Any, decompressors: Any) -> None:

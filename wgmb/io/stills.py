@@ -136,6 +136,7 @@ def _read_tiff(data: bytes, allow: stated.Allow) -> np.ndarray:
             )
         if sum(page.databytecounts) > len(data) or page.samplesperpixel > 4:
             raise ValueError("damaged: the header declares more data than the file holds")
+        stated.tiff_segments_held(page, len(data))
         stated.bound_segments(page, tifffile.TIFF.DECOMPRESSORS)
         return page.asarray()
 
