@@ -169,8 +169,15 @@ def patterns_in(folder: str | Path) -> list[str]:
 def _near(pattern: str | Path) -> str:
     """The end of a message on frames that are not there: a sequence that may be meant, or ''."""
     folder, name = os.path.split(str(pattern))
-    meant = did_you_mean(name, patterns_in(folder))
+    stem = _stem(name)
+    there = [one for one in patterns_in(folder) if did_you_mean(stem, [_stem(one)])]
+    meant = did_you_mean(name, there)  # the number is as long in all, and says nothing
     return meant if folder == "" else meant.replace("'", f"'{folder}{os.sep}", 1)
+
+
+def _stem(name: str) -> str:
+    """The name before its number, without the marks between: shot.####.exr -> shot."""
+    return _NUMBER.split(name)[0].rstrip("._-")
 
 
 def frame_numbers(text: str, name: str = "frames") -> list[int]:
