@@ -219,6 +219,13 @@ class Segments:
         sealed = record.seal(text.encode(), text)
         atomic.write_file(path.with_suffix(".json"), *sealed, mode=self._mode)
 
+    def drop(self, index: int) -> None:
+        """Remove a segment that has no record, which no run can use."""
+        path = self._file(index)
+        if not path.with_suffix(".json").exists():
+            with contextlib.suppress(OSError):
+                path.unlink()
+
     def _content(self, index: int) -> dict[str, Any]:
         numbers = self._ranges[index]
         times = ",".join(str(self._times[n]) for n in numbers)
@@ -275,9 +282,17 @@ class Segment:
         self._video.add(picture, time - self._start)
 
     def close(self) -> None:
-        """Put the segment in place, and its record beside it."""
-        self._video.close()
-        self._segments.finished(self._index)
+        """Put the segment in place, and its record beside it: both or neither."""
+
+        def drop() -> None:
+            self._segments.drop(self._index)
+
+        with leftovers.removed_by(drop):
+            try:
+                self._video.close()
+                self._segments.finished(self._index)
+            finally:
+                drop()
 
     def abandon(self) -> None:
         """Leave nothing of it behind."""
