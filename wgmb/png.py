@@ -22,7 +22,7 @@ class NotebookImage:
         self.png, self.size = png, size
 
     def __repr__(self) -> str:
-        return f"Shown({self.size[0]} x {self.size[1]})"
+        return f"NotebookImage({self.size[0]} x {self.size[1]})"
 
     def _repr_png_(self) -> bytes:
         return self.png

@@ -52,7 +52,7 @@ _OWN = 0.5  # frame intervals around a frame that it stands for
 class Job:
     """A run whose every frame is settled; `settle` makes one, run/job_file.py keeps it in a file.
 
-    `asked`: with the method, the shutter and the way to motion that were chosen. `settings`: the
+    `request`: with the method, the shutter and the way to motion that were chosen. `settings`: the
     record of every frame. `flow`: where motion comes from, in words, if the frames hold none.
     `since`: files in the output that are older [ns since 1970] are not done; None: they may be.
     `is_part_of_run`: another process has looked at the outputs that exist.

@@ -28,7 +28,7 @@ struct Chunk {                  // time slices of one source frame that are done
 @group(1) @binding(11) var<storage, read_write> means: array<vec4f>;            // mean colour over the slices so far
 @group(1) @binding(12) var<storage, read_write> counts: array<f32>;             // weight of that mean
 @group(1) @binding(13) var output: Output;
-@group(1) @binding(14) var bends: texture_2d<u32>;       // of the source, see bends.wgsl
+@group(1) @binding(14) var bends: texture_2d<u32>;       // of the source, see common/trajectory5.wgsl
 
 override FIVE_POSITIONS: bool = false;     // read `bends`; else paths are parabolas
 override WEIGHTED: bool = false;

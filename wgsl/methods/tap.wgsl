@@ -9,7 +9,7 @@
 @group(1) @binding(2) var weight: texture_2d<f32>;      // 0: stays out of its neighbours' blur
 @group(1) @binding(3) var linear: sampler;
 @group(1) @binding(4) var output: Output;
-@group(1) @binding(5) var bends: texture_2d<u32>;       // see bends.wgsl
+@group(1) @binding(5) var bends: texture_2d<u32>;       // see common/trajectory5.wgsl
 
 override CURVED: bool = true;       // the parabola through three positions; else a line along their mean velocity
 override FIVE_POSITIONS: bool = false;  // read `bends`; else no path leaves its parabola

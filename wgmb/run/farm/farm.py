@@ -23,7 +23,7 @@ _CONNECT = 10  # seconds to reach a scheduler
 
 @dataclass
 class Farm(WorkerPool):
-    """A Place whose workers blur jobs; InputError where dask.distributed is missing."""
+    """Workers that blur jobs together; InputError where dask.distributed is missing."""
 
     def __post_init__(self) -> None:
         with needed_by("`workers` and `cluster`"):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...color.srgb import srgb
+from ... import metrics
 from ...threads import crew
 
 
@@ -18,7 +18,7 @@ class Measured:
     """Between display values; `flip` comes later, where flip-evaluator is installed."""
 
     samples: int  # of the reference
-    psnr: float  # dB
+    psnr: float  # dB; infinite if they are the same
     flip: Future | None = None
 
 
@@ -46,17 +46,8 @@ class Quality:
         least = min(2 * have.samples, total) if have else self.ENOUGH
         if done < least or (have and have.samples == done):
             return
-        got, want = (srgb(picture[..., :3]) for picture in pictures())
-        error = float(np.mean((got.astype("f8") - want) ** 2))
-        psnr = -10 * np.log10(max(error, 1e-10))
+        picture, truth = (image[..., :3] for image in pictures())
+        psnr = metrics.psnr(picture, truth)
         known = importlib.util.find_spec("flip_evaluator") is not None
-        flip = self._worker.submit(_flip, got, want) if known else None
-        self._last = key, Measured(done, float(psnr), flip)
-
-
-def _flip(got: np.ndarray, want: np.ndarray) -> float:
-    """Mean LDR-FLIP of display values (Andersson et al. 2020)."""
-    import flip_evaluator  # pyright: ignore[reportMissingImports]
-
-    _, mean, _ = flip_evaluator.evaluate(want, got, "LDR", inputsRGB=True)
-    return float(mean)
+        flip = self._worker.submit(metrics.flip, picture, truth) if known else None
+        self._last = key, Measured(done, psnr, flip)
