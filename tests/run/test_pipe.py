@@ -294,6 +294,12 @@ def test_matroska_goes_out_with_its_colours_and_bits(tmp_path):
     assert (again.coding.matrix, again.coding.transfer, again.coding.primaries) == (1, 1, 1)
 
 
+def test_what_a_file_has_besides_its_pictures_is_said(tmp_path):
+    path = clips.write(tmp_path / "a.mkv", tone=0.3)
+    done = wgmb(path, "-o", "-", "--flow", "none")
+    assert b"only its pictures go through a pipe; left out: audio\n" in done.stderr
+
+
 def test_a_stream_of_uneven_times_is_refused_and_pauses_leave_places(tmp_path):
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(6)]
 

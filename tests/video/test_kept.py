@@ -1,6 +1,9 @@
 """Facts about a video that are no streams: crop, time code, names of data, views and colours."""
 
+import io
+import os
 import struct
+import threading
 from fractions import Fraction
 
 import av
@@ -11,7 +14,12 @@ from PIL import Image, features
 import make_clips as clips
 from wgmb import blur_video
 from wgmb.cli.app import main
+from wgmb.io.pipes import STDOUT
+from wgmb.run.pipe import blur_pipe
+from wgmb.run.video import VideoRequest
 from wgmb.sequence.frame_file import is_video
+from wgmb.settings import OutputSettings
+from wgmb.settings.video import VideoSettings
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.stream_text import _read, cropped, whole_samples
 from wgmb.video.write.time_code import moved
@@ -222,6 +230,38 @@ def test_two_views_are_kept_or_said(tmp_path, mode, to):
         again = tmp_path / "c.mkv"
         blur_video(tmp_path / f"b.{to}", again, flow="none", resume=True)
         assert stereo_mode(VideoReader(again).facts) == mode
+
+
+def test_a_projection_and_two_views_go_through_pipes_or_are_said(tmp_path, device):
+    def setup(stream):
+        stream.metadata["stereo_mode"] = "top_bottom"
+
+    def piped(source, output, codec=None, stdout=None):
+        request = VideoRequest(video=VideoSettings(flow="none", codec=codec))
+        return blur_pipe(
+            source, OutputSettings(output=str(output)), request, stdout=stdout, device=device
+        )
+
+    source = matroska(
+        tmp_path / "a.mkv", (0x7670, SPHERES["turned"]), setup=setup, tags=(1, 9, 16, 9)
+    )
+    stated = VideoReader(source).facts
+    assert stated.projection is not None and stereo_mode(stated) == "top_bottom"
+    said = piped(source, STDOUT, stdout=io.BytesIO()).left_out
+    assert [line.split(";")[0] for line in said] == [
+        "YUV4MPEG2 states no colours, and these are not what players assume",
+        "its projection (360 degrees) is not kept (.mkv and .mp4 hold most)",
+        "that it has two views (top bottom) is not kept (.mkv holds most)",
+    ]
+    kept = io.BytesIO()
+    assert piped(source, STDOUT, "ffv1", kept).left_out == []
+    os.mkfifo(tmp_path / "fifo")
+    writer = threading.Thread(target=(tmp_path / "fifo").write_bytes, args=(kept.getvalue(),))
+    writer.start()
+    assert piped(str(tmp_path / "fifo"), tmp_path / "b.mp4").left_out == []
+    writer.join()
+    reader = VideoReader(tmp_path / "b.mp4")
+    assert reader.facts == stated and len(list(reader)) == 8
 
 
 def test_a_sphere_that_a_container_cannot_hold_is_said(tmp_path):

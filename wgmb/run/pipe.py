@@ -21,12 +21,12 @@ from ..settings.video import VideoSettings
 from ..video.clock import tick
 from ..video.exposures import Exposures
 from ..video.holdouts import NONE
-from ..video.read.stream_reader import StreamReader
+from ..video.read.stream_reader import StreamReader, only_pictures
 from ..video.write.encoders import FINEST_RATE, SUFFIXES, Encoding, Facts, chosen
 from ..video.write.format import VideoFormat
 from ..video.write.streamed import MatroskaStream
 from ..video.write.writer import VideoWriter
-from ..video.y4m import Y4mReader, Y4mWriter, coding_in
+from ..video.y4m import Y4mReader, Y4mWriter, coding_in, lost_in
 from . import engine
 from .engine import Input
 from .pictures import SteadyFrames, steady
@@ -54,7 +54,8 @@ class _Source:
     """The name of the samples in YUV4MPEG2, if they came so."""
     exposures: Exposures
     frames: Callable[[Form], Input[Any, Any]]
-    reader: Reader | None
+    notes: list[str]
+    """Lines that a user should know."""
 
     def format(self, encoding: Encoding, base: Fraction) -> tuple[VideoFormat, list[str]]:
         """The form in which the output is written; and what is lost, in words."""
@@ -97,7 +98,7 @@ def blur_pipe(
         run = request.open(device)
         tell(f"motion: {run.how}")
         found = _piped(reader, run, output, fps_in) if reader else _of_file(source, run, output)
-        for text in reader.notes if reader else ():
+        for text in found.notes:
             tell(f"{_plain(source)}: {text}")
         writer = _writer(output, found, encoding, stack, stdout)
         sink = VideoSink(writer)
@@ -111,7 +112,7 @@ def blur_pipe(
             output=output.output,
             frames=sink.count,
             seconds=time.perf_counter() - begun,
-            notes=reader.notes if reader else [],
+            notes=found.notes,
             left_out=writer.left_out,
             loss=loss,
         )
@@ -197,7 +198,7 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
 
     space = reader.space if isinstance(reader, Y4mReader) else ""
     return _Source(
-        reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader
+        reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader.notes
     )
 
 
@@ -213,7 +214,9 @@ def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
         return ExposedFrames(exposures, shutter, plan.wanted, form)
 
     rate = 1 / plan.wanted[0].interval
-    return _Source(reader.size, reader.coding, reader.facts, rate, "", exposures, frames, None)
+    kinds = [stream.kind for stream in reader.streams] + ["chapters"] * (reader.chapters > 0)
+    notes = plan.notes + ([only_pictures(kinds)] if kinds else [])
+    return _Source(reader.size, reader.coding, reader.facts, rate, "", exposures, frames, notes)
 
 
 def _writer(
@@ -240,9 +243,7 @@ class _ToY4m:
         self._writer = Y4mWriter(
             stream, source.size, source.rate, self.coding, source.space, aspect
         )
-        self.left_out = []
-        if source.coding.alpha and not self.coding.alpha:
-            self.left_out.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
+        self.left_out = lost_in(source.size, source.coding, source.facts)
 
     def add(self, picture: CodedPicture, time: Fraction) -> None:
         self._writer.add(picture)

@@ -15,17 +15,19 @@ from typing import BinaryIO, Literal, cast
 
 import numpy as np
 
-from ..color.coding import BT709, UNSPECIFIED, CodedPicture, Coding
+from ..color.coding import BT601, BT709, SRGB, UNSPECIFIED, CodedPicture, Coding
 from ..errors import InputError
 from ..io import limits
 from ..io.pipes import PipeWriter
 from .pixels import PlaneLayout
-from .read.color_tags import COLORS, assumed
+from .read.color_tags import COLORS, PAL, RANGES, assumed
+from .write import views
 from .write.encoders import Facts
 
 _LONGEST = 4096  # bytes of a line
 _STEPS = {"420": (2, 2), "422": (2, 1), "444": (1, 1), "440": (1, 2), "411": (4, 1)}
 _NAMES = {steps: name for name, steps in _STEPS.items()}
+_AS_BT709 = BT709, BT601, SRGB, 14, 15  # curves of BT.2020, too
 _SITED = "jpeg", "mpeg2", "paldv"  # how samples of chroma lie in 4:2:0
 _PLAIN = re.compile(r"(420|422|444|440|411|mono)(jpeg|mpeg2|paldv|alpha|p?(?:9|10|12|14|16))?")
 
@@ -117,10 +119,9 @@ class Y4mReader:
         bits = int((more or "8").lstrip("p")) if (more or "8").lstrip("p").isdigit() else 8
         model: Literal["grey", "yuv"] = "grey" if kind == "mono" else "yuv"
         steps = _STEPS.get(kind, (1, 1))
-        of = PlaneLayout("", None, model, bits, steps, more == "alpha", full)
-        tags = 2 if full else 1, *(COLORS[color] if color else (UNSPECIFIED,) * 3)
-        coding, said = assumed(of, self.size, "h264", cast("tuple[int, int, int, int]", tags))
-        return replace(coding, full_range=full), [
+        of = Coding(model, bits, steps, more == "alpha", full)
+        coding, said = _assumed(of, self.size, color)
+        return coding, [
             f"does not state its colours: {', '.join(said)} assumed; `color_in` sets others"
         ] if said else []
 
@@ -165,6 +166,39 @@ def coding_in(coding: Coding) -> Coding:
             coding, model="yuv", steps=(1, 1), alpha=False, full_range=False, matrix=BT709
         )
     return replace(coding, alpha=coding.alpha and (coding.bits, coding.steps) == (8, (1, 1)))
+
+
+def lost_in(size: tuple[int, int], coding: Coding, facts: Facts) -> list[str]:
+    """Facts about the pictures of a file that a pipe does not hold, in words."""
+    said, held = [], coding_in(coding)
+    if coding.alpha and not held.alpha:
+        said.append("YUV4MPEG2 holds no such transparency; `codec='ffv1'` does")
+    taken, _ = _assumed(held, size, None)
+    if any(a != b for a, b in zip(_for_players(taken), _for_players(held), strict=True)):
+        said.append(
+            "YUV4MPEG2 states no colours, and these are not what players assume; "
+            "`codec='ffv1'` states them"
+        )
+    if facts.mastering or facts.light_level:
+        said.append("YUV4MPEG2 keeps no HDR10 data (mastering display, light level)")
+    return [*said, *views.left_out(facts, ".y4m")]
+
+
+def _for_players(coding: Coding) -> tuple[int, int, int]:
+    """Matrix, transfer and primaries, with one number for those that players show alike."""
+    transfer = BT709 if coding.transfer in _AS_BT709 else coding.transfer
+    matrix, primaries = (BT601 if n == PAL else n for n in (coding.matrix, coding.primaries))
+    return matrix, transfer, primaries
+
+
+def _assumed(
+    of: Coding, size: tuple[int, int], color: str | None
+) -> tuple[Coding, tuple[str, ...]]:
+    """The coding of such samples in a pipe that states no colours; see color_tags.assumed."""
+    like = PlaneLayout("", None, of.model, of.bits, of.steps, of.alpha, of.full_range)
+    tags = RANGES[of.full_range], *(COLORS[color] if color else (UNSPECIFIED,) * 3)
+    coding, said = assumed(like, size, "h264", cast("tuple[int, int, int, int]", tags))
+    return replace(coding, full_range=of.full_range), said
 
 
 def space_of(coding: Coding) -> str:

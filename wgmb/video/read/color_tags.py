@@ -17,8 +17,9 @@ from ...color.coding import (
 )
 from ..pixels import PlaneLayout
 
-_PAL = 5  # primaries of 625 lines
+PAL = 5  # primaries of 625 lines
 _LIMITED, _FULL = 1, 2  # ranges, as FFmpeg counts them
+RANGES = {False: _LIMITED, True: _FULL}
 _RESERVED = (0, 3)  # as primaries and transfer; as matrix 3 only
 _VIDEO_CODECS = ("h264", "hevc", "av1", "vp8", "vp9", "mpeg2video", "mpeg4", "vvc")
 
@@ -30,8 +31,8 @@ COLORS = {
 }
 """Matrix, transfer and primaries by the names that a user chooses from."""
 
-_OF_MATRIX = {BT709: BT709, _PAL: _PAL, BT601: BT601, BT2020: BT2020, 10: BT2020}
-_OF_PRIMARIES = {BT709: BT709, _PAL: _PAL, BT601: BT601, BT2020: BT2020}
+_OF_MATRIX = {BT709: BT709, PAL: PAL, BT601: BT601, BT2020: BT2020, 10: BT2020}
+_OF_PRIMARIES = {BT709: BT709, PAL: PAL, BT601: BT601, BT2020: BT2020}
 
 Tags = tuple[int, int, int, int]
 """Range, matrix, transfer, primaries."""
@@ -87,7 +88,7 @@ def assumed(
         transfer = SRGB if of.model == "rgb" else BT709
         said.append("transfer sRGB" if transfer == SRGB else "transfer BT.709")
     if not told[3]:
-        small = _PAL if size[1] == 576 else BT601
+        small = PAL if size[1] == 576 else BT601
         primaries = BT709 if is_hd or of.model == "rgb" else small
         if matrix == BT2020 or told[1]:
             primaries = _OF_MATRIX.get(matrix, primaries)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -99,15 +99,18 @@ class StreamReader:
         """Pictures a second, as stated or found at the beginning; None if it is not known."""
         aspect = self._stream.sample_aspect_ratio or Fraction(1)
         self.facts = Facts(
-            1 / aspect if self._turn.swaps else aspect, mastering_of(side), light_level_of(side)
+            1 / aspect if self._turn.swaps else aspect,
+            mastering_of(side),
+            light_level_of(side),
+            side.get(Type.SPHERICAL),
+            side.get(Type.STEREO3D),
         )
         self.notes = [
             f"does not state its colours: {', '.join(said)} assumed; `color_in` sets others"
         ] if said else []  # fmt: skip
         others = [s.type or "data" for s in self._container.streams if s is not self._stream]
         if others:
-            kinds = ", ".join(dict.fromkeys(others))
-            self.notes.append(f"only its pictures go through a pipe; left out: {kinds}")
+            self.notes.append(only_pictures(others))
 
     def _opened(self) -> InputContainer:
         return av.open(
@@ -201,6 +204,11 @@ class StreamReader:
         lacks = _stated(self._container) - end
         if lacks > _LACKS and not self.loss:
             self.loss = f"is cut off: it ends at {float(end):.2f} s of {float(end + lacks):.2f} s"
+
+
+def only_pictures(kinds: Iterable[str]) -> str:
+    """A line on what a video has besides its pictures, which no pipe carries here."""
+    return f"only its pictures go through a pipe; left out: {', '.join(dict.fromkeys(kinds))}"
 
 
 class _Source:

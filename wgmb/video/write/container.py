@@ -22,13 +22,13 @@ from ...errors import InputError
 from ...io import atomic, record_block
 from ...io import record as records
 from ..pixels import buffer
+from ..read.color_tags import RANGES
 from . import views
 from .encoders import CONTAINERS, HARDWARE, Encoding
 from .format import VideoFormat
 from .scheduling import kept_scheduling
 from .texts import fitting
 
-_RANGES = {False: 1, True: 2}  # limited, full, as FFmpeg counts them
 _FEW = 2  # frames: x265 states no decoding times for so few
 # No checksum of the texts, which the seal changes; no random number as the file's name.
 _MATROSKA = {"write_crc32": "0", "fflags": "+bitexact"}
@@ -174,26 +174,11 @@ class VideoFile(NewFile):
         self.has_views = views.are_stated(format.facts)
         self._base, self._rate, self._packets = format.base, format.rate, 0
         self._late_times = format.encoding.encoder.name == "libx265"
-        self._source: OutputContainer | None = None  # of an encoder, beside the file
-        self._into: VideoStream | None = None  # of the file, if the encoder has another
         try:
-            self._stream = self._begun(format)
+            self._pictures = PictureStream(self.container, format)
         except (FFmpegError, OSError) as error:
             self.abandon()
             raise _why(path, format.encoding, error) from None
-
-    def _begun(self, format: VideoFormat) -> VideoStream:
-        """The stream that encodes; that of the file is `_into`."""
-        if format.encoding.codec == "gif" or not views.are_stated(format.facts):
-            return begin(self.container, format)
-        self._into = views.stream_after(self.container, sample_of(format), format.facts)
-        self._into.time_base = format.base
-        name_codec(self._into, format.encoding)
-        self._source = av.open(io.BytesIO(), "w", format="matroska")
-        stream = begin(self._source, format)
-        # Matroska's form of it would say that packets have Matroska's form, too.
-        self._into.codec_context.extradata = stream.codec_context.extradata
-        return stream
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
         """Write what can be written once `frame`, of the encoder's format, is there."""
@@ -201,11 +186,9 @@ class VideoFile(NewFile):
             frame.pts, frame.time_base = tick, self._base
             self._packets += 1
         try:
-            packets = self._stream.encode(frame)
+            packets = self._pictures.encode(frame)
         except (FFmpegError, OSError) as error:
             raise atomic.about(self.path, error) from None
-        for packet in packets if self._into is not None else ():
-            packet.stream = self._into
         self.mux(self._timed(packets))
 
     def _timed(self, packets: list[Packet[VideoStream]]) -> list[Packet[VideoStream]]:
@@ -220,6 +203,35 @@ class VideoFile(NewFile):
     def finish(self) -> None:
         """Write what the encoder still holds."""
         self.encode(None)
+
+
+class PictureStream:
+    """A stream of pictures that is added to a container, and its encoder.
+
+    The encoder belongs to a stream of its own where the container's one is made after a sample,
+    as a projection or two views need it (see views.py).
+    """
+
+    def __init__(self, container: OutputContainer, format: VideoFormat):
+        self._source: OutputContainer | None = None  # of the encoder, beside the file
+        self._into: VideoStream | None = None
+        if format.encoding.codec == "gif" or not views.are_stated(format.facts):
+            self._stream = begin(container, format)
+            return
+        self._into = views.stream_after(container, sample_of(format), format.facts)
+        self._into.time_base = format.base
+        name_codec(self._into, format.encoding)
+        self._source = av.open(io.BytesIO(), "w", format="matroska")
+        self._stream = begin(self._source, format)
+        # Matroska's form of it would say that packets have Matroska's form, too.
+        self._into.codec_context.extradata = self._stream.codec_context.extradata
+
+    def encode(self, frame: av.VideoFrame | None) -> list[Packet[VideoStream]]:
+        """The packets that are ready once `frame` is there; None: all that are left."""
+        packets = self._stream.encode(frame)
+        for packet in packets if self._into is not None else ():
+            packet.stream = self._into
+        return packets
 
 
 def begin(container: OutputContainer, format: VideoFormat) -> VideoStream:
@@ -268,7 +280,7 @@ def name_codec(stream: VideoStream, encoding: Encoding) -> None:
 
 def tag(on: av.VideoFrame | VideoCodecContext, coding: Coding) -> None:
     """Write the four tags of a Coding."""
-    on.color_range = _RANGES[coding.full_range]
+    on.color_range = RANGES[coding.full_range]
     on.colorspace, on.color_trc = coding.matrix, coding.transfer
     on.color_primaries = coding.primaries
 

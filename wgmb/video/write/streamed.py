@@ -11,7 +11,7 @@ from av.video.reformatter import VideoReformatter
 from ...color.coding import CodedPicture
 from ...io.pipes import PipeWriter
 from ..pixels import THREADS, frame_of, pixel_format
-from .container import begin, tag
+from .container import PictureStream, tag
 from .format import VideoFormat
 
 
@@ -23,7 +23,7 @@ class MatroskaStream:
         self._planar, self._pixels = pixel_format(format.coding), format.pixels
         self._by, self._count = VideoReformatter(), 0
         self._container = av.open(stream, "w", format="matroska")
-        self._stream = begin(self._container, format)
+        self._stream = PictureStream(self._container, format)
 
     def add(self, picture: CodedPicture) -> None:
         """Append a picture."""
