@@ -1,9 +1,10 @@
-"""Make docs/page.html: one file that draws live in a browser, without a request to any network.
+"""Make the page for browsers: one file that draws live, without a request to any network.
 
     python tools/page/make_page.py [--media] [OUTPUT]
 
 The parts are in docs/page/; shaders, constants and recorded passes come from Python. The same
-parts give the same bytes. `--media` first renders docs/page/media/ anew: the video and the images
+parts give the same bytes. OUTPUT is build/page/page.html by default, from where `./run docs` takes
+it; it is not kept in git. `--media` first renders docs/page/media/ anew: the video and the images
 that the page shows where there is no WebGPU. Those are committed.
 """
 
@@ -24,7 +25,7 @@ import page_recording
 ROOT = Path(__file__).parents[2]
 PARTS = ROOT / "docs" / "page"
 MEDIA = PARTS / "media"
-OUTPUT = ROOT / "docs" / "page.html"
+OUTPUT = ROOT / "build" / "page" / "page.html"
 MAIN = "main.js"
 MOST = 2_000_000
 """Bytes of the page, at most."""
@@ -189,15 +190,17 @@ def main() -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--media", action="store_true", help="render docs/page/media anew, first")
-    parser.add_argument("output", nargs="?", type=Path, default=OUTPUT)
+    parser.add_argument("output", nargs="?", type=Path)
     options = parser.parse_args()
     if options.media:
         make_media()
     data = page().encode()
     if len(data) > MOST:
         sys.exit(f"the page has {len(data):,} bytes, {MOST:,} are allowed")
-    options.output.write_bytes(data)
-    sys.stderr.write(f"{options.output}: {len(data):,} bytes\n")
+    output = options.output or OUTPUT
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_bytes(data)
+    sys.stderr.write(f"{output}: {len(data):,} bytes\n")
     return 0
 
 
