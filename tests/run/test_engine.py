@@ -9,6 +9,7 @@ import pytest
 
 from wgmb import InputError
 from wgmb.run import engine
+from wgmb.run.engine import RunOptions
 
 pytestmark = pytest.mark.fast
 
@@ -139,7 +140,7 @@ def test_the_caller_takes_frames_as_a_sink_does():
 
 def test_what_is_done_is_skipped_where_that_is_wished():
     told, tell = states()
-    report = engine.run(made := Numbers(4), Kept(1, 3), resume=True, progress=tell)
+    report = engine.run(made := Numbers(4), Kept(1, 3), RunOptions(resume=True, progress=tell))
     assert (report.skipped, report.done, made.begun) == ([1, 3], [2, 4], [2, 4])
     assert sorted(told) == [(1, "skipped"), (2, "done"), (3, "skipped"), (4, "done")]
     assert engine.run(Numbers(4), Kept(1, 3)).skipped == []
@@ -159,7 +160,7 @@ def test_a_fault_is_raised_and_the_sink_abandoned(stage, error, way):
     sink = Kept(errors={4: error}) if stage == "put" else Kept()
     made = Numbers(**({} if stage == "put" else {stage: {4: error}}))
     with pytest.raises(type(error)):
-        engine.run(made, sink, on_error=way)
+        engine.run(made, sink, RunOptions(on_error=way))
     assert sink.end == ["abandoned"] and not left()
     assert sink.numbers == [1, 2, 3][: len(sink.numbers)]
     if isinstance(error, Exception):  # what was made before an error is kept
@@ -175,7 +176,7 @@ def test_frames_that_fail_are_reported_and_the_others_made():
 
     told, tell = states()
     sink = Kept(errors={5: InputError("no room\nat all")})
-    report = engine.run(Some(6), sink, progress=tell, on_error="go on")
+    report = engine.run(Some(6), sink, RunOptions(progress=tell, on_error="go on"))
     assert report.failed == {2: "torn", 5: "no room at all"}
     assert (report.done, report.bad) == ([1, 3, 4, 6], {3: {"depth": 7}})
     assert [state for _, state in told] == ["done", "failed", "done", "done", "failed", "done"]
@@ -185,7 +186,7 @@ def test_frames_that_fail_are_reported_and_the_others_made():
 def test_a_full_disk_ends_the_run_after_three_frames():
     full = OSError("disk full")
     sink = Kept(errors=dict.fromkeys((2, 4, 5, 6, 7), full))
-    report = engine.run(made := Numbers(30), sink, on_error="go on")
+    report = engine.run(made := Numbers(30), sink, RunOptions(on_error="go on"))
     assert report.stopped == "disk full"
     assert (report.done, sorted(report.failed)) == ([1, 3], [2, 4, 5, 6])
     assert len(made.begun) <= 9
@@ -193,7 +194,7 @@ def test_a_full_disk_ends_the_run_after_three_frames():
 
 def test_a_whole_sink_ends_with_its_first_error_and_is_not_there():
     sink = Whole(errors={3: OSError("disk full")})
-    report = engine.run(Numbers(), sink, on_error="go on")
+    report = engine.run(Numbers(), sink, RunOptions(on_error="go on"))
     assert (report.stopped, report.done, sorted(report.failed)) == ("disk full", [], [3])
     assert sink.end == ["abandoned"]
 
@@ -203,7 +204,7 @@ def test_a_whole_sink_ends_with_its_first_error_and_is_not_there():
 def test_a_run_that_is_asked_to_stop_begins_no_other_frame(way, kind):
     stop = threading.Event()
     sink = kind(after=lambda n: n == 3 and stop.set())
-    report = engine.run(made := Numbers(), sink, stop=stop, on_error=way)
+    report = engine.run(made := Numbers(), sink, RunOptions(stop=stop, on_error=way))
     assert report.stopped == engine.ON_REQUEST
     assert sink.numbers[:3] == [1, 2, 3] and len(made.begun) <= 5
     whole = kind is Whole
@@ -214,7 +215,7 @@ def test_a_run_that_is_asked_to_stop_begins_no_other_frame(way, kind):
 def test_a_stop_after_the_last_frame_stopped_nothing():
     stop = threading.Event()
     sink = Kept(after=lambda n: n == COUNT and stop.set())
-    assert engine.run(Numbers(), sink, stop=stop).stopped == ""
+    assert engine.run(Numbers(), sink, RunOptions(stop=stop)).stopped == ""
 
 
 def test_a_sink_that_cannot_be_closed():
@@ -222,7 +223,7 @@ def test_a_sink_that_cannot_be_closed():
         def close(self):
             raise OSError("torn")
 
-    report = engine.run(Numbers(), sink := Torn(), on_error="go on")
+    report = engine.run(Numbers(), sink := Torn(), RunOptions(on_error="go on"))
     assert (report.stopped, report.done) == ("torn", [])
     with pytest.raises(OSError, match="torn"):
         engine.run(Numbers(), sink := Torn())
@@ -236,7 +237,7 @@ def test_an_error_of_the_progress_ends_the_run():
 
     sink = Kept()
     with pytest.raises(KeyboardInterrupt):
-        engine.run(Numbers(), sink, progress=tell, on_error="go on")
+        engine.run(Numbers(), sink, RunOptions(progress=tell, on_error="go on"))
     assert sink.end == ["abandoned"] and len(sink.numbers) <= 3
 
 

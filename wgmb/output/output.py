@@ -141,10 +141,14 @@ class Output:
         for number, made_of in frames:
             crc = zlib.crc32(json.dumps([number, made_of]).encode(), crc)
         self._settle({"frames": f"{crc:08x}"})
-        how = {"resume": self._resume, "overwrite": self._overwrite}
         expected = self._expected(None)
         paths = [video.path for video in self._videos.values()]
-        done = [finished_videos.is_finished(path, expected, **how) for path in paths]
+        done = [
+            finished_videos.is_finished(
+                path, expected, resume=self._resume, overwrite=self._overwrite
+            )
+            for path in paths
+        ]
         self._replaces = self._overwrite or any(path.exists() for path in paths)
         return all(done)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from typing import Any, Literal, Protocol, TypeVar
 
 from .. import gpu
@@ -22,6 +23,25 @@ from .report import BatchReport, Progress
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 ON_REQUEST = "on request"  # why a run stopped whose `stop` was set
 _END: Any = object()  # what follows the last item
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The course of a run, whatever it makes: what it skips, whom it tells, and when it ends."""
+
+    resume: bool = False
+    """Frames that the sink has are skipped."""
+    progress: Progress | None = None
+    """Called with a frame's number and "done", "skipped" or "failed", in the thread where that
+    happens."""
+    stop: Stop | None = None
+    """Once it is set, no other frame is begun; those that are blurred are put, and the report's
+    `stopped` is ON_REQUEST."""
+    on_error: Literal["stop", "go on"] = "stop"
+    """"stop" raises the first error and abandons the sink. "go on" reports a frame that fails, and
+    makes the others. Where HOPELESS frames one after the other fail to be put for the same reason
+    (a full disk), or a whole sink fails, the run ends, and the report's `stopped` is the reason."""
+
 
 IsDone = Callable[[int, dict[str, Any]], bool]
 """Called with a frame's number and what it depends on: True if the sink has it already."""
@@ -110,25 +130,10 @@ def frames(
 
 
 def run(
-    input: Input[Any, _Blurred],
-    sink: Sink[_Blurred],
-    *,
-    resume: bool = False,
-    progress: Progress | None = None,
-    stop: Stop | None = None,
-    on_error: Literal["stop", "go on"] = "stop",
+    input: Input[Any, _Blurred], sink: Sink[_Blurred], options: RunOptions = RunOptions()
 ) -> BatchReport:
-    """Put every frame that `input` makes into `sink`, and close it.
-
-    `resume`: frames that the sink has are skipped. `progress` is called with a frame's number and
-    "done", "skipped" or "failed", in the thread where that happens. Once `stop` is set, no other
-    frame is begun; those that are blurred are put, and the report's `stopped` is ON_REQUEST.
-
-    `on_error`: "stop" raises the first error and abandons the sink. "go on" reports a frame that
-    fails, and makes the others. Where HOPELESS frames one after the other fail to be put for the
-    same reason (a full disk), or a whole sink fails, the run ends, and `stopped` is the reason.
-    """
-    return _Run(input, sink, resume, progress, stop, on_error == "go on")()
+    """Put every frame that `input` makes into `sink`, and close it."""
+    return _Run(input, sink, options)()
 
 
 def _read_ahead(
@@ -150,18 +155,11 @@ def _until(is_over: Callable[[], bool], items: Iterator[_Read]) -> Iterator[_Rea
 class _Run:
     """One call of `run`."""
 
-    def __init__(
-        self,
-        input: Input[Any, Any],
-        sink: Sink[Any],
-        resume: bool,
-        progress: Progress | None,
-        stop: Stop | None,
-        goes_on: bool,
-    ):
-        self._input, self._sink, self._resume, self._goes_on = input, sink, resume, goes_on
-        self._tell = progress or (lambda number, state: None)
-        self._stop = stop or Stop()
+    def __init__(self, input: Input[Any, Any], sink: Sink[Any], options: RunOptions):
+        self._input, self._sink = input, sink
+        self._resume, self._goes_on = options.resume, options.on_error == "go on"
+        self._tell = options.progress or (lambda number, state: None)
+        self._stop = options.stop or Stop()
         self._report = BatchReport(total=input.total)
         self._reasons: list[str] = []
 

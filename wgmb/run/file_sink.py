@@ -9,8 +9,8 @@ from typing import Any
 from ..errors import Error, reason
 from ..output.output import Output
 from ..output.result import Result
-from .engine import Input, run
-from .report import BatchReport, Progress
+from .engine import Input, RunOptions, run
+from .report import BatchReport
 
 
 @dataclass
@@ -45,10 +45,8 @@ def run_into(
     output: Output,
     input: Input[Any, BlurredFrame],
     numbers: Sequence[int],
+    options: RunOptions,
     made_of: Callable[[int], dict[str, Any]] = lambda number: {},
-    *,
-    progress: Progress | None = None,
-    **how: Any,
 ) -> BatchReport:
     """`engine.run` into an Output; nothing where a resumed run finds its video finished.
 
@@ -68,9 +66,9 @@ def run_into(
         output.abandon()
         raise
     if not is_finished:
-        return run(input, FileSink(output), progress=progress, **how)
+        return run(input, FileSink(output), options)
     output.abandon()
     for number in numbers:
-        if progress is not None:
-            progress(number, "skipped")
+        if options.progress is not None:
+            options.progress(number, "skipped")
     return BatchReport(total=len(numbers), skipped=list(numbers))

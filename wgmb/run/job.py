@@ -39,11 +39,13 @@ from ..settings.record import record
 from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..threads import Stop
-from .conversion import RateConversion
+from .conversion import RateConversion, RateConversionStages
+from .engine import RunOptions
 from .needs import check_needs
 from .report import BatchReport, Progress
 from .request import BlurRequest
-from .sequence import blur_sequence, convert_sequence
+from .sequence import blur_into
+from .stages import Stages
 
 _OWN = 0.5  # frame intervals around a frame that it stands for
 
@@ -178,12 +180,15 @@ class Run:
         return self.conversion.numbers(self.clip) if self.conversion else self.clip.numbers
 
     def __call__(self, progress: Progress | None = None, stop: Stop | None = None) -> BatchReport:
-        """Blur every frame; see blur_sequence and convert_sequence."""
-        files = self.clip, self.blur, self.output
-        how: dict[str, Any] = {"resume": self.resume, "progress": progress, "stop": stop}
+        """Blur every frame; see blur_sequence."""
+        options = RunOptions(self.resume, progress, stop, on_error="go on")
+        return blur_into(self.output, self._stages(), options)
+
+    def _stages(self) -> Stages:
+        all_views = self.output.takes_views
         if self.conversion is not None:
-            return convert_sequence(*files, self.conversion, **how)
-        return blur_sequence(*files, confidence=self.confidence, **how)
+            return RateConversionStages(self.clip, self.blur, self.conversion, all_views)
+        return Stages(self.clip, self.blur, self.confidence, all_views)
 
 
 def settle(request: BlurRequest, adapter: str | None = None) -> Job:
@@ -221,8 +226,9 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     request = replace(request, blur=blur, video=video)
     blur, output = request.blur, request.output
     request.shutter.make()  # says what is wrong with it
-    groups = blur, request.shutter, request.input, output
-    settings = record(*groups, samples=blur.settled_samples()) | request.color_record(shown)
+    samples = blur.settled_samples()
+    settings = record(blur, request.shutter, request.input, output, samples=samples)
+    settings |= request.color_record(shown)
     if request.confidence:
         check_confidence(blur.method or "", output)
         settings["confidence"] = True

@@ -24,7 +24,7 @@ from ..sequence.frame_file import FrameFile
 from ..settings import InputSettings, OutputSettings, parameters_of, size_of
 from ..settings.perception import PerceptionSettings
 from ..settings.record import record
-from .engine import IsDone, run
+from .engine import IsDone, RunOptions, run
 from .file_sink import BlurredFrame, FileSink
 from .report import BatchReport, Progress
 
@@ -115,7 +115,7 @@ class PerceptionRun:
 
     def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Write what is seen of each frame; the first error ends it."""
-        return run(self.frames, FileSink(self.output), progress=progress)
+        return run(self.frames, FileSink(self.output), RunOptions(progress=progress))
 
 
 def perceive(

@@ -65,8 +65,9 @@ class PerceivedVideo:
     def __call__(self, progress: Progress | None = None) -> VideoReport:
         """Write the perceived video, or its frames."""
         begun = time.perf_counter()
-        how = self.output, VideoSettings(), self.wanted, self.settings
-        left_out = write(self, *how, progress=progress)
+        left_out = write(
+            self, self.output, VideoSettings(), self.wanted, self.settings, progress=progress
+        )
         return VideoReport(
             self.reader.path,
             self.output.output,

@@ -102,20 +102,22 @@ def blur_pipe(
             tell(f"{_plain(source)}: {text}")
         writer = _writer(output, found, encoding, stack, stdout)
         sink = VideoSink(writer)
-        engine.run(found.frames(coded_form(writer.coding)), sink, progress=progress)
+        engine.run(
+            found.frames(coded_form(writer.coding)), sink, engine.RunOptions(progress=progress)
+        )
         loss = reader.loss if reader else ""
         if reader and not sink.count:
             raise InputError(loss or f"{_plain(source)}: holds no pictures")
-        return run.report(
-            found.exposures,
-            path=Path(source),
-            output=output.output,
-            frames=sink.count,
-            seconds=time.perf_counter() - begun,
+        report = VideoReport(
+            Path(source),
+            output.output,
+            sink.count,
+            time.perf_counter() - begun,
             notes=found.notes,
             left_out=writer.left_out,
             loss=loss,
         )
+        return run.described(report, found.exposures)
 
 
 def _check(source: str, output: OutputSettings, request: VideoRequest) -> None:

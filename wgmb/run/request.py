@@ -55,8 +55,8 @@ class BlurRequest(SettingsGroups):
         shown = self.color.open(needed=not self.output.is_exr)
         input = replace(self.input, frames=None, skip_missing=True) if settled else self.input
         space = self.color.space(shown)
-        masks = self.blur.holdout, self.blur.scale
-        return input.open(self.pattern, *masks, space, settled), shown
+        holdout, scale = self.blur.holdout, self.blur.scale
+        return input.open(self.pattern, holdout, scale, space, settled), shown
 
     def color_record(self, display: Display | None) -> dict[str, str | None]:
         """Colour settings that change the contents of the files."""

@@ -24,7 +24,7 @@ from ..settings import (
 )
 from ..settings.color import DisplaySettings, color_record
 from ..settings.record import record
-from .engine import IsDone
+from .engine import IsDone, RunOptions
 from .file_sink import BlurredFrame, run_into
 from .job import check_confidence
 from .report import BatchReport, Progress
@@ -96,10 +96,10 @@ class SceneRequest:
         made = blur.make(shutter.make(), device)
         size = size_of(options.size)
         render = Render(scene, made, size=size, fps=fps, antialias=options.antialias)
-        how = {"sharp": self.sharp, "passes": self.passes}
         settings = record(
             output, blur, shutter, options,
-            scene=self.scene, fps=fps, samples=blur.settled_samples(), **how,
+            scene=self.scene, fps=fps, samples=blur.settled_samples(),
+            sharp=self.sharp, passes=self.passes,
         )  # fmt: skip
         if self.confidence:
             check_confidence(made.method.name, output)
@@ -107,7 +107,9 @@ class SceneRequest:
         display = self.color.open(needed=not output.is_exr)
         settings |= color_record(display, output.output)
         files = output.make(settings, list(times), display=display)
-        frames = RenderedFrames(render, times, confidence=self.confidence, **how)
+        frames = RenderedFrames(
+            render, times, sharp=self.sharp, passes=self.passes, confidence=self.confidence
+        )
         return SceneRun(render, frames, files, output.resume)
 
     def _check(self) -> None:
@@ -133,8 +135,8 @@ class SceneRun:
 
     def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Render every frame; the first error ends it."""
-        numbers = self.output.numbers
-        return run_into(self.output, self.frames, numbers, resume=self.resume, progress=progress)
+        options = RunOptions(self.resume, progress)
+        return run_into(self.output, self.frames, self.output.numbers, options)
 
 
 def _with_passes(render: Render, frame: Frame, number: int) -> FrameFile:

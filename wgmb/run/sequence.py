@@ -5,8 +5,6 @@ A failing frame is reported, and the others are made; see engine.py for the thre
 
 from __future__ import annotations
 
-from typing import Any
-
 from ..errors import InputError
 from ..io.frame_numbers import has_view
 from ..output.names import beyond
@@ -15,7 +13,8 @@ from ..output.vectors import VectorOutput
 from ..pipeline.blur import Blur
 from ..sequence.clip import Clip
 from ..threads import Stop
-from .conversion import RateConversion, RateConversionStages
+from .conversion import RateConversionStages
+from .engine import RunOptions
 from .file_sink import run_into
 from .report import BatchReport, Progress, describe_frames, describe_input
 from .stages import MotionStages, Stages
@@ -45,29 +44,19 @@ def blur_sequence(
     raised again. InputError, before any frame is blurred, if a mask names an object that no
     Cryptomatte has. Masks by index or id can be checked at the end only: `absent`.
     """
-    _check_names(clip, output)
-    stages = Stages(clip, blur, confidence, output.takes_views)
-    return _run(stages, output, resume, progress, stop)
+    options = RunOptions(resume, progress, stop, on_error="go on")
+    return blur_into(output, Stages(clip, blur, confidence, output.takes_views), options)
 
 
-def convert_sequence(
-    clip: Clip,
-    blur: Blur,
-    output: Output,
-    conversion: RateConversion,
-    *,
-    resume: bool = False,
-    progress: Progress | None = None,
-    stop: Stop | None = None,
-) -> BatchReport:
-    """Blur `clip` into `output` at another rate; numbers are those of the output's frames.
+def blur_into(output: Output, stages: Stages, options: RunOptions) -> BatchReport:
+    """Blur every frame of `stages` into `output`; everything else is as for `blur_sequence`.
 
-    Everything else is as for `blur_sequence`; conversion.py tells the inputs of an output frame.
+    Numbers are those of the output's frames; conversion.py has the inputs of each at another rate.
     """
-    _check_names(clip, output)
-    stages = RateConversionStages(clip, blur, conversion, output.takes_views)
-    report = _run(stages, output, resume, progress, stop)
-    report.beyond = beyond(output.pattern, stages.numbers[-1])
+    _check_names(stages.clip, output)
+    report = _run(output, stages, options)
+    if isinstance(stages, RateConversionStages):
+        report.beyond = beyond(output.pattern, stages.numbers[-1])
     return report
 
 
@@ -91,16 +80,9 @@ def _check_names_of_views(clip: Clip, output: Output) -> None:
         )
 
 
-def _run(
-    stages: Stages,
-    output: Output,
-    resume: bool,
-    progress: Progress | None,
-    stop: Stop | None,
-) -> BatchReport:
-    """All frames into an output; one that fails is reported, and the others are made."""
-    how: Any = {"resume": resume, "progress": progress, "stop": stop, "on_error": "go on"}
-    report = run_into(output, stages, stages.numbers, stages.made_of, **how)
+def _run(output: Output, stages: Stages, options: RunOptions) -> BatchReport:
+    """All frames into an output, and what was seen in them."""
+    report = run_into(output, stages, stages.numbers, options, stages.made_of)
     describe_input(report, stages.clip)
     is_converted = isinstance(stages, RateConversionStages)
     describe_frames(report, stages.clip, is_converted=is_converted)
@@ -123,4 +105,4 @@ def vectors_sequence(
     `blur_sequence`. `blur`: its device is used, and its `max_blur` limits the motion.
     """
     stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
-    return _run(stages, output, resume, progress, stop)
+    return _run(output, stages, RunOptions(resume, progress, stop, on_error="go on"))

@@ -211,18 +211,18 @@ class VideoRun:
             masks=files_of(request.blur.holdout),
             progress=progress,
         )
-        return self.report(
-            exposures,
-            path=plan.reader.path,
-            output=plan.name,
-            frames=len(plan.wanted),
-            seconds=time.perf_counter() - begun,
+        report = VideoReport(
+            plan.reader.path,
+            plan.name,
+            len(plan.wanted),
+            time.perf_counter() - begun,
             notes=plan.notes,
             left_out=left_out,
             scaling=plan.reader.scaling(),
             loss=plan.reader.loss(),
             lost=self._told_lost(before),
         )
+        return self.described(report, exposures)
 
     def _lost_so_far(self) -> tuple[int, int]:
         """Number of pictures in which the source lost something, and of those it checked."""
@@ -238,11 +238,11 @@ class VideoRun:
             "and stays sharp: `flow=search` follows more, soonest with `flow_quality=draft`"
         )
 
-    def report(self, exposures: Exposures, **facts: Any) -> VideoReport:
-        """The report on exposures that were made; `facts`: fields that they do not tell."""
+    def described(self, report: VideoReport, exposures: Exposures) -> VideoReport:
+        """The report with what its exposures tell."""
         shots = exposures.shots
-        return VideoReport(
-            **facts,
+        return replace(
+            report,
             method=" and ".join(exposures.methods) if self.motion is not None else "",
             cuts=sorted(shots.cuts) if shots else [],
             flashes=shots.flashes if shots else [],

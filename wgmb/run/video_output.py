@@ -26,7 +26,7 @@ from ..video.write.gif import check_rate
 from ..video.write.other_streams import OtherStreams, sounds_in
 from ..video.write.segments import Segments, remove_left
 from ..video.write.writer import VideoWriter
-from .engine import Input, run
+from .engine import Input, RunOptions, run
 from .file_sink import FileSink
 from .report import Progress
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
@@ -138,7 +138,7 @@ def _write_video(
         try:
             for numbers in segments.to_do():
                 part = source.frames(wanted[numbers.start : numbers.stop], coded)
-                run(part, VideoSink(segments.begin(numbers)), progress=progress)
+                run(part, VideoSink(segments.begin(numbers)), RunOptions(progress=progress))
             return [*lost, *segments.join(record.blank(made_of), others)]
         finally:
             segments.release()
@@ -146,7 +146,7 @@ def _write_video(
     writer = VideoWriter(
         path, temporary, form, None, others, record=said, is_new=not there, mode=mode
     )
-    run(source.frames(wanted, coded), VideoSink(writer), progress=progress)
+    run(source.frames(wanted, coded), VideoSink(writer), RunOptions(progress=progress))
     remove_left(path)
     return [*lost, *writer.left_out]
 
@@ -187,6 +187,6 @@ def _write_frames(
         return ["is already done", *remain]
     channels = 4 if source.reader.coding.alpha else 3
     form = LightForm(source.device, channels, FIRST)
-    run(source.frames(left, form), FileSink(files), progress=progress)
+    run(source.frames(left, form), FileSink(files), RunOptions(progress=progress))
     done = len(wanted) - len(left)
     return [f"{done} of {len(wanted)} frames were done before", *remain] if done else remain

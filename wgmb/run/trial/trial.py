@@ -20,7 +20,7 @@ from ...video.exposures import VideoBlur
 from ...video.output_times import OutputFrame, OutputFrames
 from ...video.planes import Planes
 from ...video.write.encoders import SUFFIXES
-from ..engine import IsDone
+from ..engine import IsDone, RunOptions
 from ..file_sink import BlurredFrame, run_into
 from ..report import BatchReport, Progress
 from ..video import VideoPlan, VideoRun
@@ -64,7 +64,7 @@ class Trial:
     def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Write them."""
         numbers = range(1, self.total + 1)
-        return run_into(self._output, self._frames, numbers, progress=progress)
+        return run_into(self._output, self._frames, numbers, RunOptions(progress=progress))
 
 
 class TriedFrames:
