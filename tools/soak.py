@@ -37,6 +37,7 @@ from soaking import (
 )
 from soaking.processes import wgmb
 from soaking.table import HEAD, ROWS, Row, run_rows, write_whole
+from wgmb import interpreter
 
 MODULES = (
     memory, viewing, stopping, damage, hostile, resuming, numbers, devices, disks, names, videos,
@@ -55,6 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
         for row in LISTED:
             sys.stdout.write(f"{row.name:16} {row.full:7,} {row.quick or '':>4}  {row.about}\n")
         return 0
+    interpreter.name_runtime_folder()  # for the processes that are forked from this one
     rows = _chosen(given)
     head = f"{_about(given)}\n\n{HEAD}"
     print(head, flush=True)

@@ -1,7 +1,9 @@
 """Videos that are damaged, cut off or none, and streams that are not the pictures."""
 
 import re
+import struct
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import numpy as np
@@ -240,6 +242,24 @@ def test_animated_webp_is_refused_by_its_name(tmp_path):
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=40)
     with pytest.raises(InputError, match=r"a\.webp: animated WebP is not read; GIF, APNG and AVIF"):
         VideoReader(path)
+
+
+def wider_screen(path: Path, size: tuple[int, int]) -> Path:
+    """A GIF whose screen is made larger; its pictures stay as they are."""
+    data = bytearray(path.read_bytes())
+    data[6:10] = struct.pack("<HH", *size)
+    path.write_bytes(data)
+    return path
+
+
+def test_a_small_gif_may_ask_for_4k_but_for_no_more(tmp_path):
+    """A blur holds 100 bytes a pixel of it, and a small file may take 1 GB."""
+    frames, tick = [clips.grey((64, 48), "rgb8") for _ in range(2)], Fraction(1, 20)
+    path = clips.write(tmp_path / "s.gif", frames, codec="gif", pixels="rgb8", tick=tick)
+    assert VideoReader(wider_screen(path, (4096, 2160))).size == (4096, 2160)
+    with pytest.raises(InputError, match=r"s\.gif: .* over 10,737,418 pixels, .* `max_mb=8192` al"):
+        VideoReader(wider_screen(path, (5000, 4000)))
+    assert VideoReader(path, max_mb=8192).size == (5000, 4000)
 
 
 @pytest.mark.full

@@ -129,15 +129,20 @@ class VideoReader:
         width, height = stream.codec_context.width, stream.codec_context.height
         if not (width and height) and stream.codec_context.name == "webp":
             raise InputError(f"{self.path}: animated WebP is not read; GIF, APNG and AVIF are")
-        if not (width and height):
-            raise InputError(f"{self.path}: its pictures have no size; it may be cut off")
+        stored = self.path.stat().st_size
+        if not (width and height):  # FFmpeg forgets sizes over its limit
+            most = limits.most_pixels(stored, HELD_CHANNELS, self._max_mb)
+            raise InputError(
+                f"{self.path}: no size of its pictures can be read: it is cut off, or they have "
+                f"over {most:,} pixels, which a file of {stored:,} bytes may not ask for; "
+                f"`max_mb={2 * self._max_mb:g}` allows twice as many"
+            )
         if not 0 < min(width, height) <= max(width, height) <= limits.MOST_PIXELS_A_SIDE:
             raise InputError(
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
                 f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
             )
         promised = limits.unpacked((width, height), HELD_CHANNELS)
-        stored = self.path.stat().st_size
         limits.check(self.path, f"{width} x {height}", promised, stored, self._max_mb)
 
     def _probe(self) -> None:
