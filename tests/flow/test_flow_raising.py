@@ -8,7 +8,7 @@ from twins import flow as twin
 from wgmb import Flow
 from wgmb.flow.pyramid import features
 from wgmb.flow.raising import raised, reduced
-from wgmb.flow.shot import EFFORTS, IN_SOFTWARE
+from wgmb.flow.shot import EFFORTS
 
 SIZES = [((9, 13), (4, 6)), ((7, 16), (7, 5)), ((5, 4), (1, 1))]
 
@@ -46,10 +46,10 @@ def test_raised_states_are_those_of_the_likest_pixel(size, less, close):
 @pytest.mark.parametrize("quality, size, searched", [
     ("draft", (640, 360), (440, 248)), ("draft", (1080, 1920), (248, 440)),
     ("draft", (440, 9), (440, 9)), ("draft", (4000, 1), (440, 1)), ("best", (9000, 90), (9000, 90)),
-    ("fast", (1280, 720), (1280, 720)), ("fast", (1920, 1080), (960, 540)),
+    ("fast", (1920, 1080), (1920, 1080)),
 ])  # fmt: skip
 def test_sizes_that_are_searched(quality, size, searched):
-    assert (EFFORTS | IN_SOFTWARE)[quality].searched_size(size) == searched
+    assert EFFORTS[quality].searched_size(size) == searched
 
 
 @pytest.mark.full

@@ -37,13 +37,7 @@ def test_best_looks_farther_with_every_level(width):
 
 
 def test_a_job_watches_as_many_files_as_motion_depends_on():
-    flow, largest = Flow(), (16384, 16384)
-    assert flow.reach(largest) <= FAR
-    pytest.importorskip("cv2")
-    from wgmb.flow.dis import Dis
-    from wgmb.flow.dis.better_match import BetterMatch
-
-    assert BetterMatch(Dis(), flow, by_ways=True).reach(largest) == FAR
+    assert Flow().reach((16384, 16384)) <= FAR
 
 
 @pytest.mark.parametrize("quality", ["fast", "draft"])
@@ -53,26 +47,11 @@ def test_quick_searches_do_not_look_farther_than_they_tell(quality, width):
     assert farthest(flow, width, True) <= flow.reach((width, HEIGHT))
 
 
-def test_two_sources_whose_ways_are_compared_do_not_look_farther_than_they_tell():
+@pytest.mark.parametrize("by_place", [False, True])
+def test_dense_inverse_search_does_not_look_farther_than_it_tells(by_place):
     pytest.importorskip("cv2")
     from wgmb.flow.dis import Dis
-    from wgmb.flow.dis.better_match import BetterMatch
+    from wgmb.flow.dis.by_place import ByPlace
 
-    both = BetterMatch(Dis("best"), Flow(quality="fast", whole=True), by_ways=True)
-    assert farthest(both, 160, True) <= both.reach((160, HEIGHT))
-
-
-def test_dense_inverse_search_does_not_look_farther_than_it_tells():
-    pytest.importorskip("cv2")
-    from wgmb.flow.dis import Dis
-
-    dis = Dis("fast")
-    assert farthest(dis, 160, False) <= dis.reach((160, HEIGHT))
-    asked = set()
-
-    def load(number):
-        asked.add(number)
-        return grey(160, number)
-
-    dis.shot(load).loses(10)
-    assert max(abs(number - 10) for number in asked) <= dis.reach((160, HEIGHT))
+    dis = ByPlace() if by_place else Dis("fast")
+    assert farthest(dis, 160, False) == dis.reach((160, HEIGHT)) == 1

@@ -187,18 +187,6 @@ def test_motion_smears_what_moves_and_leaves_the_rest_to_the_sample(tmp_path, ca
         assert np.abs(soft[n].astype(int) - sharp[n])[:, 64:].max() <= 1
 
 
-def test_a_line_says_what_dense_inverse_search_lost(tmp_path, capsys):
-    chroma = np.full((60, 120), 128, np.uint8)
-    for speed, is_lost in ((1, False), (45, True)):
-        grey = make.disc_before_squares(5, speed)
-        frames = (clips.frame([luma, chroma, chroma], "yuv420p") for luma in grey)
-        source = write(tmp_path / f"{speed}.mp4", frames, 24)
-        out = tmp_path / f"out {speed}.mp4"
-        text = run(capsys, "blur", source, "-o", out, "--flow", "dis", "--flow-quality", "fast")
-        assert ("too fast for dense inverse search in" in text) == is_lost
-        assert ("--flow search follows more" in text) == is_lost
-
-
 def test_what_never_changes_while_all_around_does_stays_sharp(tmp_path, capsys):
     source = write(tmp_path / "a.mp4", moving(24, hud=True), 96)
     out = tmp_path / "b.mkv"

@@ -68,11 +68,7 @@ class VideoExposure:
     def __call__(self, at, interval, shutter):
         cells = self.shots.cells(at, interval, shutter)
         size = self.shots[cells[0].index].content.coded.size
-        parts = (
-            (cell, frame, self._blur)
-            for cell in cells
-            for _, frame in self.views.in_shot(cell.index)
-        )
+        parts = ((cell, self.views.in_shot(cell.index), self._blur) for cell in cells)
         texture = self._exposer.texture(size, parts)
         return self.array(texture)[..., :3]
 
@@ -81,7 +77,7 @@ class VideoExposure:
         return self._images.download(encoder, texture)
 
     def motion(self, index):
-        return self.array(self.views.in_shot(index)[0][1].frame.motion.texture)
+        return self.array(self.views.in_shot(index).frame.motion.texture)
 
 
 def linear_average(at, interval, degrees, fps=240.0, count=40):

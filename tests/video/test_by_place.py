@@ -14,7 +14,6 @@ pytest.importorskip("cv2")
 import cv2
 
 from wgmb.flow.dis import Dis
-from wgmb.flow.dis.better_match import BetterMatch
 from wgmb.flow.dis.by_place import ByPlace
 
 WIDTH, HEIGHT, COUNT = 320, 180, 5
@@ -105,7 +104,7 @@ def test_the_motion_of_a_picture_depends_on_its_neighbours_alone():
 def test_blocks_find_a_body_that_dense_inverse_search_loses():
     pictures = [p[..., 1].copy() for p in shot(48, 40, "textured")]
     row, middle = HEIGHT // 2, slice(WIDTH // 2 - 10, WIDTH // 2 + 10)
-    quick = Dis("fast").motion(*pictures[1:4])[row, middle]
+    quick = Dis("fast").motion(pictures[1:4])[row, middle]
     assert np.abs(quick[:, 2] - 48).min() > 20
     found = ByPlace().motion(pictures[1:4])[row, middle]
     assert np.abs(found - [-48, 0, 48, 0]).max() < 2
@@ -116,7 +115,7 @@ def test_blocks_find_a_body_that_dense_inverse_search_loses():
 def test_motion_is_as_dense_inverse_search_finds_it_where_all_moves_alike():
     wide = texture(WIDTH + 60, HEIGHT, 9, 3)
     pictures = [np.rint(200 * wide[:, 3 * n : 3 * n + WIDTH, 1]).astype("u1") for n in range(3)]
-    np.testing.assert_array_equal(ByPlace().motion(pictures), Dis("fast").motion(*pictures))
+    np.testing.assert_array_equal(ByPlace().motion(pictures), Dis("fast").motion(pictures))
 
 
 def test_gather_at_edges_taps_the_rest(device):
@@ -174,17 +173,15 @@ def test_a_method_that_is_asked_for_blurs_all_pictures(device, settings):
         assert isinstance(run.motion, ByPlace)
 
 
-@pytest.mark.parametrize("quality", ["best", "fast"])
-def test_without_a_gpu_the_best_search_takes_dense_inverse_search_where_that_matches_better(
-    device, quality, monkeypatch
-):
-    settings = VideoSettings(flow="search", flow_quality=quality)
-    is_slow = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-    motion, how = settings.source(device)
-    is_mixed = quality == "best" and is_slow
-    assert type(motion) is (BetterMatch if is_mixed else Flow)
-    assert ("dense inverse search" in how) == is_mixed
-    if is_mixed:
-        assert motion.reach((640, 360)) == 1 + Flow(quality="fast", device=device).reach((640, 360))
+@pytest.mark.parametrize("quality", ["best", "fast", "draft"])
+def test_a_search_is_one_in_the_quality_that_is_asked_for(device, quality):
+    motion, how = VideoSettings(flow="search", flow_quality=quality).source(device)
+    assert type(motion) is Flow and how == "search"
+    size = 1920, 1080
+    assert motion.reach(size) == Flow(quality=quality, device=device).reach(size)
+
+
+def test_without_a_gpu_and_opencv_a_draft_is_searched(as_without_a_gpu, monkeypatch):
     monkeypatch.setattr("wgmb.settings.video.is_installed", lambda package: False)
-    assert type(settings.source(device)[0]) is Flow and settings.source(device)[1] == "search"
+    motion, how = VideoSettings().source(gpu.open_device())
+    assert type(motion) is Flow and how == "search (draft, because there is no GPU)"

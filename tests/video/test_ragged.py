@@ -1,6 +1,7 @@
 """Motion that is ragged is smoothed; motion that is not keeps its bits."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -129,10 +130,11 @@ def roughness(motion):
 
 def motion_of(device, source, depth=True):
     """A VideoMotion by a source, and the textures of three pictures, all kept."""
-    shots = ShotReader(iter([Picture(n / 25, None, n) for n in range(5)]))
+    content = SimpleNamespace(grey=np.zeros(SIZE, np.uint8))
+    shots = ShotReader(iter([Picture(n / 25, content, n) for n in range(5)]))
     shots.at(0.08, 4)
     motion = VideoMotion(source, shots, device, depth)
-    return motion, {n: motion.hypotheses(n)[0] for n in (1, 2, 3)}
+    return motion, {n: motion.textures(n) for n in (1, 2, 3)}
 
 
 def down(device, texture):
@@ -144,7 +146,7 @@ def test_the_motion_of_a_video_is_nowhere_ragged(device, depth):
     """As arrays, which the viewer takes, and as textures, which a blur takes."""
     source = Speckled()
     motion, kept = motion_of(device, source, depth)
-    for n, (_, ways, far) in kept.items():
+    for n, (ways, far) in kept.items():
         found, found_depth = motion(n)
         np.testing.assert_array_equal(down(device, ways), found)
         assert (far is None) == (found_depth is None) == (not depth)
@@ -153,13 +155,16 @@ def test_the_motion_of_a_video_is_nowhere_ragged(device, depth):
         np.testing.assert_array_equal(found[:4], plain[:4])
 
 
-def test_dense_inverse_search_alone_is_left_as_it_is(device, monkeypatch):
-    """Its motion is smooth, and found quickly."""
+def test_dense_inverse_search_is_left_as_it_is(device, monkeypatch):
+    """Its motion is smooth, and found quickly. Its depth is found when it is asked for."""
     pytest.importorskip("cv2")
-    source = Speckled()
-    monkeypatch.setattr(Dis, "shot", lambda self, load, depth=True: source.shot(load, depth))
+
+    plain = Speckled().motion(0)
+    monkeypatch.setattr(Dis, "motion", lambda self, pictures: plain)
     motion, kept = motion_of(device, Dis("fast"))
-    for n, (_, ways, far) in kept.items():
-        np.testing.assert_array_equal(down(device, ways), source.motion(n))
-        np.testing.assert_array_equal(motion(n)[0], source.motion(n))
-        assert (down(device, far) == 1).all()
+    for n, (ways, far) in kept.items():
+        np.testing.assert_array_equal(down(device, ways), plain)
+        found, depth = motion(n)
+        np.testing.assert_array_equal(found, plain)
+        assert far is None and depth.shape == SIZE
+        np.testing.assert_array_equal(down(device, motion.depth(n))[..., 0], depth)

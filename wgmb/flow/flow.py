@@ -9,7 +9,7 @@ from .. import gpu
 from ..errors import InputError, did_you_mean
 from .passes import FlowPasses
 from .pyramid import level_sizes
-from .shot import EFFORTS, IN_SOFTWARE, WHOLE, Load, Shot
+from .shot import EFFORTS, Load, Shot
 
 
 class Flow:
@@ -21,27 +21,17 @@ class Flow:
     finer ones. Pixels that are not found again move as what they belong to.
 
     `quality`: "best", "fast", which ends at half the size, or "draft", which searches pictures of
-    at most 440 px along the longer side. Without a GPU, "fast" searches those longer than 1280 px
-    at 960 px, unless it is to search the `whole`. `device`: your own wgpu device, the name of an
-    adapter, or None for the best one.
+    at most 440 px along the longer side. `device`: your own wgpu device, the name of an adapter, or
+    None for the best one.
     """
 
-    def __init__(
-        self,
-        *,
-        quality: str = "best",
-        device: wgpu.GPUDevice | str | None = None,
-        whole: bool = False,
-    ):
+    def __init__(self, *, quality: str = "best", device: wgpu.GPUDevice | str | None = None):
         if quality not in EFFORTS:
             known = ", ".join(EFFORTS)
             hint = did_you_mean(quality, EFFORTS)
             raise InputError(f"no flow quality {quality!r}; available: {known}{hint}")
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        efforts = EFFORTS
-        if self.device.adapter_info["adapter_type"] == gpu.SOFTWARE:
-            efforts = EFFORTS | ({"fast": WHOLE} if whole else IN_SOFTWARE)
-        self._effort = efforts[quality]
+        self._effort = EFFORTS[quality]
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion may depend on: one more for every level."""

@@ -26,7 +26,7 @@ class FlowPasses:
         self.device, self.images = device, TexturePool(device)
         self._in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.linear = device.create_sampler(mag_filter="linear", min_filter="linear")
-        self.landings, self.costs, self.tiles = (ScratchBuffer(device) for _ in range(3))
+        self.landings, self.costs = (ScratchBuffer(device) for _ in range(2))
         self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
         self._lent: set[int] = set()  # uids of textures that stay
@@ -90,12 +90,6 @@ class FlowPasses:
             width, height, layers = texture.size
             kind = texture.format, layers
             self._free.setdefault(((width, height), kind), []).append(texture)
-
-    def copy(self, source: wgpu.GPUTexture, to: wgpu.GPUTexture) -> None:
-        """Copy a texture into another one of the same size and format."""
-        encoder = self.device.create_command_encoder(label="flow copy")
-        encoder.copy_texture_to_texture({"texture": source}, {"texture": to}, source.size)
-        gpu.submit(self.device, encoder)
 
     def scratch(self, size: tuple[int, int], format: str, name: str) -> wgpu.GPUTexture:
         """A texture for one stage; the next one that asks for this name gets the same."""

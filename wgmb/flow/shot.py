@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from .. import gpu
 from ..errors import InputError
 from .carry import carry
 from .dominant import follow_most, settle
-from .edges import tiles_at_edges
 from .guide import finer, guide
 from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
@@ -50,8 +49,7 @@ class Effort:
     `polish`: how often parts of a pixel are refined and noise is removed, on every level.
     `block`: pixels along those that share a first state. `aside`: price of moving otherwise than
     most, see sweep.wgsl. `led`: on how many levels the guide may lead, from the coarsest on.
-    `above`: longer sides [px] above which a picture is searched at a smaller size, whose longer
-    side is `longest`. `at_edges`: on the finest level only what is beside another motion is swept.
+    `longest`: the longer side [px] at which larger pictures are searched.
     """
 
     coarsest: int
@@ -61,15 +59,11 @@ class Effort:
     block: int
     aside: float
     led: int
-    above: float = math.inf
-    longest: int = 0
-    at_edges: bool = False
+    longest: float = math.inf
 
     def searched_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """Width, height at which a picture of a size is searched, in the same proportion."""
-        if max(size) <= self.above:
-            return size
-        by = self.longest / max(size)
+        by = min(1.0, self.longest / max(size))
         return max(1, round(by * size[0])), max(1, round(by * size[1]))
 
     def sweeps(self, level: int, levels: int) -> int:
@@ -82,11 +76,8 @@ class Effort:
 EFFORTS = {
     "best": Effort(3, 2, 2, 2, block=2, aside=0.4, led=2),
     "fast": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1),
-    "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, above=440, longest=440),
+    "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, longest=440),
 }
-# "fast" at full size without a GPU, where it is to be thorough:
-WHOLE = replace(EFFORTS["fast"], finest=2, polish=2, aside=0.25, at_edges=True)
-IN_SOFTWARE = {"fast": replace(EFFORTS["fast"], above=1280, longest=960)}  # instead, without a GPU
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
 KEPT = {
     "pictures": 4,
@@ -209,9 +200,6 @@ class Shot:
             return self._polished(states, size, bound) if level else states
         coarser = self._once("mended", number, level + 1, self._mended)
         states = self._grown(coarser, level)
-        tiles = None
-        if not level and self._effort.at_edges:
-            tiles = tiles_at_edges(passes, size, coarser)
         if level > coarsest - self._effort.led and len(views.neighbours) == 2:
             states = self._led(views, level, states)
         guesses = (
@@ -220,7 +208,7 @@ class Shot:
         most = enlarged(self._results["most", number, coarsest][0], 2.0 ** (coarsest - level))
         leads = (self._results.get(("lead", number, k)) for k in range(level, coarsest + 1))
         lead = next(one for one in leads if one is not None)
-        states = sweep(passes, size, swept, states, guesses, level, count, most, lead, tiles)
+        states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 

@@ -6,7 +6,6 @@ import numpy as np
 import wgpu
 
 from ..gpu import wgsl
-from .edges import SweptTiles
 from .homography import columns
 from .passes import STATES, FlowPasses
 
@@ -16,7 +15,6 @@ BEND_STEP = 2.0  # the same of the bend, in pixels of the finest level
 MOST_APART, FINEST_APART = 1.0, 2.0  # differences beyond this [px] cost no more
 PASSES = 4  # of a sweep
 SEEDS = 64  # random numbers that a pass may take for a pixel
-LEAST_BUFFER = 16  # bytes
 MOST_PASSES = 1000  # on one level
 
 
@@ -30,20 +28,17 @@ def sweep(
     count: int,
     most: np.ndarray,
     lead: wgpu.GPUTexture | None = None,
-    tiles: SweptTiles | None = None,
 ) -> wgpu.GPUTexture:
     """New states after `count` sweeps; the given ones are taken back.
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
     `most`: the homography of most of the picture to the near frame, on this level; `lead`: what
-    repeats.py made. Only `tiles` are swept, if they are given.
+    repeats.py made.
     """
     after = passes.take(size, STATES)
-    if tiles:
-        passes.copy(states, after)
     for number in range(PASSES * count):
         is_known = number not in (0, 2)  # the first of a colour finds out what its states cost
-        args = level, number, after, most, is_known, lead, tiles
+        args = level, number, after, most, is_known, lead
         half_sweep(passes, size, matched, states, carried, *args)
         states, after = after, states
     passes.give(after)
@@ -62,15 +57,14 @@ def half_sweep(
     most: np.ndarray,
     is_known: bool = False,
     lead: wgpu.GPUTexture | None = None,
-    tiles: SweptTiles | None = None,
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
 
     `is_known`: what the states of this colour cost is in `passes.costs`, from an earlier pass.
     """
     entry = "refine" if number % 2 else "propagate"
-    grid = tiles.grid if tiles else (-(-size[0] // 2), size[1])
-    args = level, number, output, most, is_known, lead, tiles
+    grid = -(-size[0] // 2), size[1]
+    args = level, number, output, most, is_known, lead
     _run(passes, entry, size, grid, matched, states, carried, *args)
 
 
@@ -99,7 +93,6 @@ def _run(
     most,
     is_known,
     lead=None,
-    tiles: SweptTiles | None = None,
 ) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
     uniform = passes.uniform(
@@ -115,7 +108,6 @@ def _run(
         is_known=is_known,
         most=columns(most),
         lead_factor=0 if lead is None else round(max(size) / max(lead.size[:2])),
-        across=tiles.across if tiles else 0,
     )
     passes.run(
         "sweep.wgsl",
@@ -129,6 +121,5 @@ def _run(
         costs=passes.costs.at_least(4 * size[0] * size[1]),
         output=output,
         lead=states if lead is None else lead,
-        tiles=tiles.places if tiles else passes.tiles.at_least(LEAST_BUFFER),
         **matched,
     )

@@ -119,8 +119,6 @@ class VideoReport:
     """False if it had been finished before (`resume`)."""
     held_out: str = ""
     """A line about displays that stay sharp, if any were found."""
-    lost: str = ""
-    """A line about pictures in which the motion of something fast was lost, if there are any."""
 
 
 def describe_input(report: BatchReport, clip: Clip) -> None:

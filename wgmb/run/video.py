@@ -37,7 +37,6 @@ from .report import Progress, VideoReport
 from .video_output import check_output, sounds_kept, write
 from .video_sink import Form
 
-LOST = 0.05  # share of pictures with something lost, above which it is told
 _ANY_RATE = Fraction(24)  # with which a Blur begins
 _TAKEN = "frames", "cuts", "max_mb"  # of InputSettings
 
@@ -199,7 +198,6 @@ class VideoRun:
         if self.request.shutter.seconds is not None:
             return self.at(plan.fps)(plan, progress)
         begun, request = time.perf_counter(), self.request
-        before = self._lost_so_far()
         cuts = CutList(request.input.cuts or "")
         exposures = self.exposures(plan)
         left_out = write(
@@ -220,23 +218,8 @@ class VideoRun:
             left_out=left_out,
             scaling=plan.reader.scaling(),
             loss=plan.reader.loss(),
-            lost=self._told_lost(before),
         )
         return self.described(report, exposures)
-
-    def _lost_so_far(self) -> tuple[int, int]:
-        """Number of pictures in which the source lost something, and of those it checked."""
-        return getattr(self.motion, "lost", 0), getattr(self.motion, "checked", 0)
-
-    def _told_lost(self, before: tuple[int, int]) -> str:
-        """A line about pictures since `before` in which something fast was lost, or ''."""
-        lost, checked = (now - old for now, old in zip(self._lost_so_far(), before, strict=True))
-        if lost <= LOST * checked:
-            return ""
-        return (
-            f"something moves too fast for dense inverse search in {lost} of {checked} pictures, "
-            "and stays sharp: `flow=search` follows more, soonest with `flow_quality=draft`"
-        )
 
     def described(self, report: VideoReport, exposures: Exposures) -> VideoReport:
         """The report with what its exposures tell."""

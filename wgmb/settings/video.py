@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from ..video.read.reader import VideoReader
 
 
-_BEST_MARGIN = 1.3  # of the best search beside dense inverse search, see BetterMatch;
-_OTHERS = (1 / 3, 2.0), (1 / 3, 0.875)  # its further hypotheses, see there
-
-
 @dataclass(frozen=True, kw_only=True)
 class FlowSettings:
     """Source of the motion of pictures."""
@@ -58,24 +54,7 @@ class FlowSettings:
             return Dis(settings.flow_quality), how
         from ..flow import Flow
 
-        if settings._is_mixed(device):
-            from ..flow.dis import Dis
-            from ..flow.dis.better_match import BetterMatch
-
-            search = Flow(quality="fast", device=device, whole=True)
-            best, judge = Dis("best"), Dis("fast")
-            more = {"by_ways": True, "judge": judge, "others": _OTHERS}
-            return BetterMatch(best, search, _BEST_MARGIN, **more), how
         return Flow(quality=settings.flow_quality, device=device), how
-
-    def _is_mixed(self, device: wgpu.GPUDevice) -> bool:
-        """True if the best search takes dense inverse search where that matches better.
-
-        Without a GPU, clips take half of the time of the best search alone.
-        """
-        is_best = self.flow == "search" and self.flow_quality == "best"
-        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        return is_best and software and is_installed("cv2")
 
     def is_by_place(self, device: wgpu.GPUDevice) -> bool:
         """True if "auto" becomes dense inverse search that is made better by place."""
@@ -85,20 +64,17 @@ class FlowSettings:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
         if self.flow == "none":
             return self, "none: pictures are averaged"
-        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        quality, why = self.flow_quality, ""
-        is_draft = quality == "draft"
+        is_draft = self.flow_quality == "draft"
         if is_draft and self.flow == "dis":
             raise InputError("`flow_quality` draft is for `flow` search; dis is best or fast")
-        if self.flow == "auto" and software and not is_draft:
-            quality, why = "fast", " (fast, because there is no GPU)"
-        quick = self.flow == "auto" and software and not is_draft and is_installed("cv2")
-        if self.flow == "dis" or quick:
-            return replace(self, flow="dis", flow_quality=quality), f"dense inverse search{why}"
-        chosen = replace(self, flow="search", flow_quality=quality)
-        if chosen._is_mixed(device):
-            why = ", and dense inverse search where that matches better"
-        return chosen, f"search{why}"
+        flow, quality, why = self.flow, self.flow_quality, ""
+        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        if flow == "auto" and software and not is_draft:
+            flow, quality = ("dis", "fast") if is_installed("cv2") else ("search", "draft")
+            why = f" ({quality}, because there is no GPU)"
+        flow = "dis" if flow == "dis" else "search"
+        words = "dense inverse search" if flow == "dis" else "search"
+        return replace(self, flow=flow, flow_quality=quality), f"{words}{why}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, islice
 from typing import Any, Protocol
@@ -159,7 +159,7 @@ class Exposures:
         """
         begins = True
 
-        def parts(cell: Cell) -> list[Part]:
+        def part(cell: Cell) -> Part:
             nonlocal begins
             blur = self._blur
             if self._at_edges is not None and frames.has_edges(cell):
@@ -168,15 +168,13 @@ class Exposures:
             found = frames.in_shot(cell.index, blur)
             if frames.change(cell, begins):
                 begins = False
-            return [(replace(cell, share=share * cell.share), one, blur) for share, one in found]
+            return cell, found, blur
 
         size = shots[cells[0].index].content.coded.size
-        first = parts(cells[0])
-        if is_coded and len(cells) == len(first) == 1:
-            light = self._sum.alone(first[0])
+        if is_coded and len(cells) == 1:
+            light = self._sum.alone(part(cells[0]))
         else:
-            rest = chain.from_iterable(map(parts, cells[1:]))
-            light = self._sum.texture(size, chain(first, rest))
+            light = self._sum.texture(size, map(part, cells))
         return light, None if begins else frames.changing.changes(size)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +22,6 @@ from .planes import Planes
 from .ragged import KEPT
 from .thumbnail import Thumbnail
 
-_Frames = Sequence[tuple[float, FrameViews]]
 EDGE = float(wgsl.load("methods/gather/tiles/active_tiles.wgsl").constant("EDGE"))  # px
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
 
@@ -54,28 +52,22 @@ class VideoFrames:
         self._held = self._holdout.of(shots)
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
-        self._frames: dict[int, _Frames] = {}
+        self._frames: dict[int, tuple[int, FrameViews]] = {}  # by the place of their textures
 
-    def in_shot(self, index: int, blur: Blur | None = None) -> Sequence[tuple[float, FrameInShot]]:
+    def in_shot(self, index: int, blur: Blur | None = None) -> FrameInShot:
         """A picture, between its neighbours if the method takes them, of `blur` if not of its own.
 
-        It is the sum of so much of each, one for each hypothesis about its motion, or about that of
-        neighbours. What they refer to may be overwritten once two others have been asked for.
+        What they refer to may be overwritten once two others have been asked for.
         """
         wanted = [index]
         method = (blur or self._blur).method
         takes = method.needs | method.uses
         if self._source is not None and "neighbours" in takes:
             wanted = [i for i in (index - 1, index, index + 1) if self._shots.moves_on(index, i)]
-        found = {i: self._frame(i, "depth" in takes) for i in wanted}
-        made: list[tuple[float, FrameInShot]] = []
-        for number, (share, _) in enumerate(max(found.values(), key=len)):
-            views = {i: of[min(number, len(of) - 1)][1] for i, of in found.items()}
-            near = (views.get(i) for i in (index - 1, index + 1))
-            before, after = (one if one is not None and one.has_vectors else None for one in near)
-            shown = FrameInShot(views[index], before, after, self._shots[index].number)
-            made.append((share, shown))
-        return made
+        views = {i: self._frame(i, "depth" in takes) for i in wanted}
+        near = (views.get(i) for i in (index - 1, index + 1))
+        before, after = (one if one is not None and one.has_vectors else None for one in near)
+        return FrameInShot(views[index], before, after, self._shots[index].number)
 
     def change(self, cell: Cell, begins: bool) -> bool:
         """Submit what the light changes in the part of an exposure that `cell` is.
@@ -83,7 +75,7 @@ class VideoFrames:
         `begins`: it is the first part that does. False where there is no motion.
         """
         index = cell.index
-        frame = self._frame(index)[0][1]
+        frame = self._frame(index)
         if frame.motion is None or cell.shutter.degrees <= 0:
             return False
         near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
@@ -103,31 +95,34 @@ class VideoFrames:
         longest = max(abs(time) for time in times) * max(self._factors(cell.index))
         return longest * self._source.change(cell.index) > EDGE
 
-    def _frame(self, index: int, depth: bool = False) -> _Frames:
-        """The views of one picture, and its share, for each hypothesis about its motion.
-
-        `depth`: whether it is wanted, where the source finds it only then.
-        """
-        kept = self._frames.get(index)
+    def _frame(self, index: int, depth: bool = False) -> FrameViews:
+        """The views of one picture. `depth`: whether it is wanted, if it is found only then."""
+        of, kept = self._frames.get(index % KEPT, (index, None))
         light = self._light(index).create_view()
-        if kept is not None and index in self._lights and kept[0][1].color.texture is light.texture:
-            if depth and kept[0][1].depth is None and self._source is not None:
-                found = self._source.depth(index)
-                if found is not None:
-                    found = found.create_view()
-                    kept = [(share, replace(one, depth=found, key=object())) for share, one in kept]
-                    self._frames[index] = kept
-            return kept
-        motions = self._motions(index) or [(1.0, None, None)]
-        holdout = None if motions[0][1] is None else self._held_out(index)
-        made = [
-            (share, FrameViews(color=light, motion=m, depth=d, holdout=holdout, key=object()))
-            for share, m, d in motions
-        ]
-        while len(self._frames) >= KEPT:
-            self._frames.pop(next(iter(self._frames)))
-        self._frames[index] = made
-        return self._frame(index, depth) if depth and made[0][1].depth is None else made
+        if kept is None or of != index or kept.color.texture is not light.texture:
+            kept = self._moving(index, light)
+        if depth and kept.depth is None and kept.motion is not None and self._source is not None:
+            found = self._source.depth(index)
+            if found is not None:
+                kept = replace(kept, depth=found.create_view(), key=object())
+        self._frames[index % KEPT] = index, kept
+        return kept
+
+    def _moving(self, index: int, light: View) -> FrameViews:
+        """The views of one picture, with its motion within its own interval."""
+        found = None if self._source is None else self._source.textures(index)
+        if found is None:
+            return FrameViews(color=light, key=object())
+        (motion, depth), factors = found, self._factors(index)
+        if factors != (1.0, 1.0):
+            motion = self._paced(motion, f"motion {index % KEPT}", factors)
+        return FrameViews(
+            color=light,
+            motion=motion.create_view(),
+            depth=depth and depth.create_view(),
+            holdout=self._held_out(index),
+            key=object(),
+        )
 
     def _light(self, index: int) -> wgpu.GPUTexture:
         """The texture of one picture, kept until others need its place."""
@@ -143,16 +138,6 @@ class VideoFrames:
         if not known:
             self._planes.draw(coded, texture)
         return texture
-
-    def _motions(self, index: int) -> Sequence[tuple[float, View, View | None]]:
-        """Shares and motions of a picture within its own interval, and depth if it is read."""
-        factors, made = self._factors(index), []
-        hypotheses = [] if self._source is None else self._source.hypotheses(index)
-        for number, (share, motion, depth) in enumerate(hypotheses):
-            if factors != (1.0, 1.0):
-                motion = self._paced(motion, f"motion {index % KEPT} {number}", factors)
-            made.append((share, motion.create_view(), depth and depth.create_view()))
-        return made
 
     def _held_out(self, index: int) -> View | None:
         """Mask of what stays sharp in a picture."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import wgpu
 
 from ..flow import Flow, Shot
-from ..flow.dis import Dis
-from ..flow.dis.better_match import BetterMatch, Both, Hypothesis, MixedShot
-from ..flow.dis.by_place import ByPlace, PlaceShot
+from ..flow.dis import DisShot
+from ..flow.dis.by_place import PlaceShot
 from ..gpu.textures import TexturePool
 from ..shots.motion import Found, MotionSource, ShotMotion
 from ..shots.reader import ShotReader
@@ -19,20 +17,14 @@ from .planes import Planes
 from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
 
-
-class Ways(NamedTuple):
-    """A hypothesis about the motion of a picture, on the GPU; depth where it is wanted."""
-
-    share: float
-    motion: wgpu.GPUTexture
-    depth: wgpu.GPUTexture | None
+Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]
 
 
 class VideoMotion(ShotMotion):
     """The motion of the pictures that a ShotReader keeps, by their indices there, nowhere ragged.
 
-    Flow takes them as textures of `device`, in light that is not expanded; BetterMatch also as
-    grey, and others as grey alone.
+    Flow takes them as textures of `device`, in light that is not expanded, others as grey. What is
+    smooth, as dense inverse search is, is left as it is.
     """
 
     def __init__(
@@ -43,45 +35,40 @@ class VideoMotion(ShotMotion):
         depth: bool = True,
     ):
         searched = _Searched(shots, device)
-        pictures = {Flow: searched.texture, BetterMatch: searched.both}
-        picture = pictures.get(type(source), searched.grey)
+        picture = searched.texture if isinstance(source, Flow) else searched.grey
         super().__init__(source, picture, shots.moves_on, depth)
         self._device, self._images = device, TexturePool(device)
-        is_searched = not isinstance(source, Dis | ByPlace)  # which are smooth
-        self._ragged = RaggedMotion(device) if is_searched else None
+        self._ragged = RaggedMotion(device)
 
-    def hypotheses(self, index: int) -> Sequence[Ways]:
-        """Those about the motion of a picture, the likeliest first; none where it is alone.
+    def textures(self, index: int) -> Textures | None:
+        """Motion (rgba32float) of a picture; depth (r32float), if it is known; None if alone.
 
-        They are valid as RaggedMotion says.
+        They are valid as RaggedMotion says. The depth of dense inverse search is found by `depth`.
         """
         shot = self.shot(index)
-        if isinstance(shot, MixedShot):
-            return self._uploaded(index, shot.hypotheses(index))
-        return self._of(index)
-
-    def __call__(self, number: int) -> Found | None:
-        """The likeliest motion (height, width, 4) [px] of a picture, and depth; None if alone."""
-        if self._ragged is None:
-            return super().__call__(number)
-        for _, motion, depth in self._of(number):
-            return self._down(motion), None if depth is None else self._down(depth)[..., 0]
-        return None
-
-    def _of(self, index: int) -> Sequence[Ways]:
-        """The likeliest motion alone."""
-        shot = self.shot(index)
+        if isinstance(shot, DisShot):
+            motion = shot.motion(index)
+            return None if motion is None else (self._up("motion", index, motion), None)
         if isinstance(shot, Shot):
             found = shot.textures(index)
-            if found is None:
-                return []
-            return [Ways(1.0, *self._smooth(index, 0, found.motion, found.depth))]
-        if isinstance(shot, PlaceShot):
-            motion = shot.motion(index)
-            found = None if motion is None else (motion, None)
-        else:
-            found = shot(index)
-        return [] if found is None else self._uploaded(index, [Hypothesis(1.0, found)])
+            return found and self._ragged(index, found.motion, found.depth)
+        found = shot(index)
+        if found is None:
+            return None
+        motion, depth = found
+        uploaded = None if depth is None else self._up("depth", index, depth)
+        return self._ragged(index, self._up("motion", index, motion), uploaded)
+
+    def __call__(self, number: int) -> Found | None:
+        """Motion (height, width, 4) [px] of a picture, and depth; None where it is alone."""
+        shot = self.shot(number)
+        if isinstance(shot, DisShot):
+            return shot(number)
+        textures = self.textures(number)
+        if textures is None:
+            return None
+        motion, depth = textures
+        return self._down(motion), None if depth is None else self._down(depth)[..., 0]
 
     def change(self, index: int) -> float:
         """The greatest change of a picture's motion within a tile [px], infinite if not known."""
@@ -91,30 +78,12 @@ class VideoMotion(ShotMotion):
     def depth(self, index: int) -> wgpu.GPUTexture | None:
         """The depth of a picture whose motion was uploaded without; None where there is none."""
         shot = self.shot(index)
-        found = shot.depth(index) if isinstance(shot, PlaceShot) else None
-        if found is None:
-            return None
-        return self._images.upload(f"depth {index % KEPT}", found, "r32float").texture
+        found = shot.depth(index) if isinstance(shot, DisShot) else None
+        return None if found is None else self._up("depth", index, found)
 
-    def _uploaded(self, index: int, hypotheses: Sequence[Hypothesis]) -> Sequence[Ways]:
-        made: list[Ways] = []
-        place = 0 if self._ragged else index % KEPT
-        for number, (share, (motion, depth)) in enumerate(hypotheses):
-            ways = self._images.upload(f"motion {place}", motion, "rgba32float").texture
-            if depth is not None:
-                depth = self._images.upload(f"depth {place}", depth, "r32float").texture
-            made.append(Ways(share, *self._smooth(index, number, ways, depth)))
-        return made
-
-    def _smooth(
-        self,
-        index: int,
-        number: int,
-        motion: wgpu.GPUTexture,
-        depth: wgpu.GPUTexture | None,
-    ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]:
-        """Motion and depth of a hypothesis, nowhere ragged."""
-        return self._ragged(index, motion, depth, number) if self._ragged else (motion, depth)
+    def _up(self, name: str, index: int, plane: Any) -> wgpu.GPUTexture:
+        texel = "rgba32float" if plane.ndim == 3 else "r32float"
+        return self._images.upload(f"{name} {index % KEPT}", plane, texel).texture
 
     def _down(self, texture: wgpu.GPUTexture) -> Any:
         return self._images.download(self._device.create_command_encoder(), texture)
@@ -138,7 +107,3 @@ class _Searched:
     def grey(self, index: int) -> Any:
         """A picture's display values."""
         return self._shots[index].content.grey
-
-    def both(self, index: int) -> Both:
-        """The grey picture at once, its texture when it is asked for."""
-        return Both(self.grey(index), lambda: self.texture(index))

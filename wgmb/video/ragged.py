@@ -27,14 +27,12 @@ class RaggedMotion:
         index: int,
         motion: wgpu.GPUTexture,
         depth: wgpu.GPUTexture | None,
-        hypothesis: int = 0,
     ) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]:
-        """Motion to_prev, to_next [px] (rgba32float) and depth (r32float) of picture `index`, by a
-        hypothesis.
+        """Motion to_prev, to_next [px] (rgba32float) and depth (r32float) of picture `index`.
 
         They are valid until those of `index` + KEPT are asked for.
         """
-        size, place = (motion.size[0], motion.size[1]), f"{index % KEPT} {hypothesis}"
+        size, place = (motion.size[0], motion.size[1]), index % KEPT
         images, frame = self._images, gpu.FrameBindings.of_size(self._device, size)
         measured = images.view("measured", size, "rgba32float")
         none = images.view("no depth", (1, 1), "r32float")

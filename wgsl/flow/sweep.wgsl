@@ -5,7 +5,6 @@
 //#include flow/band.wgsl
 //#include flow/plane.wgsl
 //#include flow/steps.wgsl
-//#include flow/edges/tile.wgsl
 
 struct Sweep {
     color: u32,         // of the chessboard: 0 or 1
@@ -18,8 +17,8 @@ struct Sweep {
     is_known: u32,      // 1 if `costs` tells what the states of this colour cost
     most: mat4x4f,      // homography of most of the picture to the near frame: columns of 3, from pixels to pixels
     lead_factor: f32,   // pixels of this level along one of `lead`; 0 if there is none
-    across: u32,        // how many of `tiles` lie side by side in a dispatch; 0 if it is over the whole picture
-    unused: vec2u,
+    unused: u32,
+    unused_too: vec2u,
 }
 
 @group(1) @binding(5) var<uniform> sweep: Sweep;
@@ -29,7 +28,6 @@ struct Sweep {
 @group(1) @binding(9) var<storage, read_write> costs: array<f32>;   // of every pixel's state: its match
 @group(1) @binding(10) var output: StatesOut;
 @group(1) @binding(11) var lead: texture_2d_array<f32>;         // the guide, and where it leads: see repeats.wgsl
-@group(1) @binding(12) var<storage, read> tiles: array<vec2u>;  // those that are swept, one for a workgroup
 
 const SMOOTHNESS: f32 = 0.08;       // cost of 1 px of difference from the neighbours
 const BEND_SHARE: f32 = 0.5;        // of a difference of bends, against one of flows
@@ -146,13 +144,7 @@ fn attempt(best: Best, candidate: State) -> Best {
 
 /// The pixel of an invocation, which has the chessboard's colour; the one beside it is other_pixel().
 fn own_pixel(local: u32, group: vec3u) -> vec2i {
-    if sweep.across == 0u { return of_color(banded_pixel(local, group)); }
-    let block = vec2u(local / 8u % (TILE / 4u), local / (2u * TILE));   // of 4 x 2, as in swizzled_pixel()
-    let by = vec2u(4u, 2u) * block + vec2u(local % 4u, local / 4u % 2u);
-    return of_color(TILE * tiles[(band.first + group.y) * sweep.across + group.x] + by);
-}
-
-fn of_color(at: vec2u) -> vec2i {
+    let at = banded_pixel(local, group);
     return vec2i(vec2u(2u * at.x + (at.y + sweep.color) % 2u, at.y));
 }
 

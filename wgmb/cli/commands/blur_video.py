@@ -50,8 +50,6 @@ def blur_video(
             note(repeats_told(report.repeated))
         if report.held_out:
             note(as_options(report.held_out))
-        if report.lost:
-            note(as_options(report.lost))
         if report.scaling:
             note(report.scaling)
         note(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")

@@ -79,7 +79,7 @@ def _one_of_many(plan: VideoPlan, run: VideoRun, tell: Tell, quiet: bool) -> boo
         words = [took if report.is_new else "", *report.left_out, *report.notes]
         if report.is_new and run.request.video.duplicates == "fill":
             words.append(repeats_told(report.repeated))
-        words += [report.held_out, report.lost, report.scaling]
+        words += [report.held_out, report.scaling]
         note(as_options(f"{path}: {'; '.join(filter(None, words))} -> {report.output}"))
     if report.loss:
         complain(report.loss)

@@ -1,4 +1,4 @@
-"""Dense inverse search by OpenCV, what it loses, and a search where that matches better."""
+"""Dense inverse search by OpenCV, and a search of blocks where that loses something."""
 
 from .inverse_search import Dis, DisShot, Found
 

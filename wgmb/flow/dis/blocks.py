@@ -6,11 +6,12 @@ States are (height, width, 4) to_prev, to_next [px of their level].
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from .inverse_search import Pictures
 
 SMALL, HALF = 160, 320  # px along the longer side: where blocks are searched, and refined
 BLOCK, SPACING = 8, 4  # px of a block, and from one to the next
@@ -28,7 +29,6 @@ AWAY = 1.5  # levels of 255 that a pixel counts in raising
 NEAR = (0, 0), (-1, 0), (0, -1), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)
 FLAT = 2.5  # levels of deviation in a block that tells nothing
 MOST_APART = 40.0  # levels of difference of a pixel that count
-Pictures = Sequence[np.ndarray | None]
 
 
 def _cv() -> Any:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from .better_match import chosen, costs
-from .blocks import Pictures, Reduced, raised, searched
-from .inverse_search import Dis, Found
+from .blocks import Reduced, raised, searched
+from .cost import is_better
+from .inverse_search import Dis, DisShot, Load, Pictures
 
 TILE = 16  # px
 THIN = 4  # px from one pixel whose motion is looked at to the next
@@ -20,7 +19,6 @@ OTHER = 0.05  # share of a tile that moves otherwise
 AROUND = 32  # px around tiles that are seen where their motion is made finer
 JOINED = 1.1  # boxes are joined where the one around them is larger by less
 MARGIN = 1.6  # times the cost of dense inverse search that the motion of blocks may have
-KEPT = 3  # pictures
 Box = tuple[slice, slice]
 
 
@@ -37,13 +35,14 @@ class ByPlace:
     """
 
     def __init__(self) -> None:
-        self.quick, self.fine = Dis("fast"), Dis("best")
+        self._quick, self._fine = Dis("fast"), Dis("best")
+        self.grey, self.depth = self._quick.grey, self._quick.depth
 
     def reach(self, size: tuple[int, int]) -> int:
         """Frames to either side of one that its motion depends on."""
         return 1
 
-    def shot(self, load: Callable[[int], np.ndarray | None], depth: bool = True) -> PlaceShot:
+    def shot(self, load: Load, depth: bool = True) -> PlaceShot:
         """Motion (height, width, 4) [px] of a shot's pictures, and depth.
 
         `load(number)`: the picture (height, width) uint8, or linear (height, width, 3 or 4).
@@ -54,7 +53,7 @@ class ByPlace:
         """That of a picture, (height, width) uint8, between its neighbours; one may lack."""
         here = pictures[1]
         assert here is not None
-        motion = self.quick.motion(pictures[0], here, pictures[2])
+        motion = self._quick.motion(pictures)
         wanted = uneven(motion, UNEVEN)
         found = searched(pictures, motion)
         if found is not None:
@@ -66,15 +65,11 @@ class ByPlace:
         whole = Reduced(pictures, max(here.shape)) if found else None
         takes = _cv().resize(wanted, None, fx=TILE, fy=TILE, interpolation=_cv().INTER_NEAREST)
         for box in _boxes(wanted, here.shape):
-            prev, own, next = (
-                None if p is None else np.ascontiguousarray(p[box]) for p in pictures
-            )
-            assert own is not None
-            one = self.fine.motion(prev, own, next)
+            part = [None if p is None else np.ascontiguousarray(p[box]) for p in pictures]
+            one = self._fine.motion(part)
             if found is not None and whole is not None:
                 other = raised(found.level, whole, found.state, box)
-                ours, its = costs([prev, own, next], one, other, MARGIN)
-                one, _ = chosen((one, None), (other, None), its < ours)
+                one = np.where(is_better(part, one, other, MARGIN)[..., None], other, one)
             there = takes[box].astype(bool)
             motion[box][there] = one[there]
         return motion
@@ -128,59 +123,10 @@ def _joined(boxes: list[tuple[int, ...]]) -> Iterator[tuple[int, int, tuple[int,
                 yield m, k, both
 
 
-class PlaceShot:
+class PlaceShot(DisShot):
     """Motion of the pictures of a shot by a ByPlace; made by `ByPlace.shot`."""
-
-    def __init__(
-        self, source: ByPlace, load: Callable[[int], np.ndarray | None], depth: bool
-    ) -> None:
-        self._source, self._load, self._depth = source, load, depth
-        self._grey: dict[int, np.ndarray | None] = {}
-        self._motion: dict[int, np.ndarray | None] = {}
-
-    def __call__(self, number: int) -> Found | None:
-        """Motion (height, width, 4) [px] and depth of a picture; None where it is alone."""
-        motion = self.motion(number)
-        if motion is None:
-            return None
-        return motion, self.depth(number) if self._depth else None
-
-    def motion(self, number: int) -> np.ndarray | None:
-        """Motion (height, width, 4) [px] of a picture; None where it is alone."""
-        return _kept(self._motion, number, self._motion_of)
 
     def change(self, number: int) -> float:
         """The greatest change of a picture's motion within a tile [px per frame interval]."""
         motion = self.motion(number)
         return 0.0 if motion is None else float(_changes(motion).max())
-
-    def depth(self, number: int) -> np.ndarray | None:
-        """Depth order (height, width) of a picture."""
-        motion = self.motion(number)
-        if motion is None:
-            return None
-        there = [self._picture(number + side) is not None for side in (-1, 1)]
-        ways = [motion[..., 2 * k : 2 * k + 2] for k in (0, 1) if there[k]]
-        return functools.reduce(np.minimum, map(self._source.quick.depth, ways))
-
-    def _motion_of(self, number: int) -> np.ndarray | None:
-        prev, here, next = (self._picture(number + side) for side in (-1, 0, 1))
-        if here is None or (prev is None and next is None):
-            return None
-        return self._source.motion([prev, here, next])
-
-    def _picture(self, number: int) -> np.ndarray | None:
-        def grey(number: int) -> np.ndarray | None:
-            picture = self._load(number)
-            return None if picture is None else self._source.quick.grey(picture)
-
-        return _kept(self._grey, number, grey)
-
-
-def _kept(known: dict[int, Any], number: int, make: Callable[[int], Any]) -> Any:
-    """The value of a number, which is made once; those of far numbers are forgotten."""
-    if number not in known:
-        for old in [n for n in known if abs(n - number) > KEPT]:
-            del known[old]
-        known[number] = make(number)
-    return known[number]

@@ -10,21 +10,23 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
 from ... import extras
 from ...color.srgb import to_display
 from ...errors import InputError
-from .consistency import REACH, SPACING, Consistency
 
 QUALITIES = ("fast", "best")
 _LEAST = 32  # pixels a side below which OpenCV fails; smaller pictures are continued
-_HALVINGS = 2  # of the size at which "fast" ends, and of that by which is told what is lost
+_HALVINGS = 2  # of the size at which "fast" ends, at most
 _ENDS_AT = 300  # px of the longer side below which "fast" does not end
 _APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
+KEPT = 3  # pictures to either side of one whose motion is kept
+Pictures = Sequence[np.ndarray | None]
+"""Previous, own, next: (height, width) uint8, None where one lacks."""
 Load = Callable[[int], np.ndarray | None]
 Found = tuple[np.ndarray, np.ndarray | None]
 
@@ -48,11 +50,10 @@ class Dis:
             cv2.DISOPTICAL_FLOW_PRESET_FAST if self._is_fast else cv2.DISOPTICAL_FLOW_PRESET_MEDIUM
         )
         self._flow: Any = cv2.DISOpticalFlow_create(preset)
-        self._shots: list[Consistency] = []
 
     def reach(self, size: tuple[int, int]) -> int:
-        """Frames to either side of one that its motion, or what it loses, depends on."""
-        return REACH + 1
+        """Frames to either side of one that its motion depends on."""
+        return 1
 
     def shot(self, load: Load, depth: bool = True) -> DisShot:
         """Motion (height, width, 4) to_prev, to_next [px] and depth of a shot's frames.
@@ -61,19 +62,7 @@ class Dis:
         display values without colour; None outside the shot. Without `depth` it is None, and the
         motion takes half the time.
         """
-        shot = DisShot(self, load, depth)
-        self._shots.append(shot.consistency)
-        return shot
-
-    @property
-    def lost(self) -> int:
-        """Number of pictures so far in which something was lost, of those that were `checked`."""
-        return sum(shot.lost for shot in self._shots)
-
-    @property
-    def checked(self) -> int:
-        """Number of pictures so far that lie between two others of their shot."""
-        return sum(len(shot.shares) for shot in self._shots)
+        return DisShot(self, load, depth)
 
     def grey(self, color: np.ndarray) -> np.ndarray:
         """A picture's display values without colour, (height, width) uint8."""
@@ -82,62 +71,21 @@ class Dis:
         shown = to_display(np.asarray(color[..., :3], np.float32), 8)
         return self._cv2.cvtColor(shown, self._cv2.COLOR_RGB2GRAY)
 
-    def between(
-        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, depth: bool
-    ) -> Found:
-        """Motion and depth of a picture, from the grey of its neighbours, one of which is there."""
-        motion = self.motion(prev, here, next)
-        if not depth:
-            return motion, None
-        ways = [motion[..., 2 * k : 2 * k + 2] for k, p in enumerate((prev, next)) if p is not None]
-        return motion, functools.reduce(np.minimum, map(self.depth, ways))
-
-    def motion(
-        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None
-    ) -> np.ndarray:
-        """Motion (height, width, 4) [px] alone."""
-        return self._motion(prev, here, next, self._finest(here.shape))
-
-    def tells(
-        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, motion: np.ndarray
-    ) -> np.ndarray:
-        """The motion by which is told what is lost in a picture, whose own is `motion`.
-
-        Of "fast" that which ends at a quarter of the size, in small pictures, too: what a finer one
-        loses besides is small, and searches find little of it.
-        """
-        if not self._is_fast or self._finest(here.shape) == _HALVINGS:
-            return motion
-        return self._motion(prev, here, next, _HALVINGS)
-
-    def change(
-        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None
-    ) -> np.ndarray:
-        """By how much blocks of `SPACING` differ from each neighbour that is there, 0 to 255."""
-        size = tuple(-(-n // SPACING) for n in here.shape[::-1])
-        area = self._cv2.INTER_AREA
-        return np.minimum.reduce(
-            [
-                self._cv2.resize(self._cv2.absdiff(here, other), size, interpolation=area)
-                for other in (prev, next)
-                if other is not None
-            ]
-        )
-
-    def _motion(
-        self, prev: np.ndarray | None, here: np.ndarray, next: np.ndarray | None, finest: int
-    ) -> np.ndarray:
-        back = None if prev is None else self._way(here, prev, finest)
-        ahead = None if next is None else self._way(here, next, finest)
+    def motion(self, pictures: Pictures) -> np.ndarray:
+        """That of a picture, (height, width) uint8, between its neighbours; one may lack."""
+        prev, here, next = pictures
+        assert here is not None
+        back = None if prev is None else self._way(here, prev)
+        ahead = None if next is None else self._way(here, next)
         found = back if back is not None else ahead
         assert found is not None
         back = -found if back is None else back  # a path goes on as on its other side
         ahead = -found if ahead is None else ahead
         return np.concatenate([back, ahead], axis=2)
 
-    def _way(self, here: np.ndarray, other: np.ndarray, finest: int) -> np.ndarray:
+    def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
         height, width = here.shape
-        self._flow.setFinestScale(finest)
+        self._flow.setFinestScale(self._finest(here.shape))
         if min(here.shape) >= _LEAST:
             return self._flow.calc(here, other, None)
         more = 0, max(_LEAST - height, 0), 0, max(_LEAST - width, 0)  # above, below, left, right
@@ -179,48 +127,68 @@ class Dis:
         return self._cv2.medianBlur(np.reciprocal(across, out=across), 5)
 
 
-class DisShot:
-    """Motion of the pictures of a shot by a Dis, and what it loses in them; made by `Dis.shot`."""
+class Source(Protocol):
+    """Motion and depth from three pictures without colour; Dis and ByPlace are two."""
 
-    def __init__(self, dis: Dis, load: Load, depth: bool):
-        self._dis, self._load, self._depth = dis, load, depth
+    def grey(self, color: np.ndarray) -> np.ndarray:
+        """A picture's display values without colour, (height, width) uint8."""
+        ...
+
+    def motion(self, pictures: Pictures) -> np.ndarray:
+        """That of a picture (height, width, 4) [px] between its neighbours; one may lack."""
+        ...
+
+    def depth(self, way: np.ndarray) -> np.ndarray:
+        """Depth (height, width) by motion (height, width, 2) [px] to a neighbour."""
+        ...
+
+
+class DisShot:
+    """Motion of the pictures of a shot by a source, each found once; made by `Dis.shot`."""
+
+    def __init__(self, source: Source, load: Load, depth: bool):
+        self._source, self._load, self._depth = source, load, depth
         self._grey: dict[int, np.ndarray | None] = {}
-        self._ahead: dict[int, Found] = {}
-        self.consistency = Consistency()
+        self._motion: dict[int, np.ndarray | None] = {}
 
     def __call__(self, number: int) -> Found | None:
         """Motion (height, width, 4) [px] and depth of a picture; None where it is alone."""
-        return self._ahead.pop(number, None) or self._motion_of(number)
+        motion = self.motion(number)
+        if motion is None:
+            return None
+        return motion, self.depth(number) if self._depth else None
 
-    def loses(self, number: int) -> bool:
-        """True if too much is lost in a picture or one beside it, whatever was asked for before.
+    def motion(self, number: int) -> np.ndarray | None:
+        """Motion (height, width, 4) [px] of a picture; None where it is alone."""
+        return _kept(self._motion, number, self._motion_of)
 
-        Their motion is found for that, and kept until it is asked for.
-        """
-        for old in [n for n in self._ahead if n < number - 1]:
-            del self._ahead[old]
-        for n in range(number - REACH, number + REACH + 1):
-            if not self.consistency.knows(n) and (found := self._motion_of(n)) is not None:
-                self._ahead[n] = found
-        return any(self.consistency.loses.get(n) for n in (number - 1, number, number + 1))
+    def depth(self, number: int) -> np.ndarray | None:
+        """Depth order (height, width) of a picture, whether or not it is wanted of all."""
+        motion = self.motion(number)
+        if motion is None:
+            return None
+        there = [self._picture(number + side) is not None for side in (-1, 1)]
+        ways = [motion[..., 2 * k : 2 * k + 2] for k in (0, 1) if there[k]]
+        return functools.reduce(np.minimum, map(self._source.depth, ways))
 
-    def _picture(self, number: int) -> np.ndarray | None:
-        if number not in self._grey:
-            for old in [n for n in self._grey if abs(n - number) > 2]:
-                del self._grey[old]
-            color = self._load(number)
-            self._grey[number] = None if color is None else self._dis.grey(color)
-        return self._grey[number]
-
-    def _motion_of(self, number: int) -> Found | None:
-        here = self._picture(number)
-        prev, next = (self._picture(number + side) for side in (-1, 1))
+    def _motion_of(self, number: int) -> np.ndarray | None:
+        prev, here, next = (self._picture(number + side) for side in (-1, 0, 1))
         if here is None or (prev is None and next is None):
             return None
-        motion, order = self._dis.between(prev, here, next, self._depth)
-        change = None
-        if prev is not None and next is not None:
-            change = self._dis.change(prev, here, next)
-        told = self._dis.tells(prev, here, next, motion)
-        self.consistency.add(number, told[..., :2], told[..., 2:], change)
-        return motion, order
+        return self._source.motion([prev, here, next])
+
+    def _picture(self, number: int) -> np.ndarray | None:
+        def grey(number: int) -> np.ndarray | None:
+            picture = self._load(number)
+            return None if picture is None else self._source.grey(picture)
+
+        return _kept(self._grey, number, grey)
+
+
+def _kept(known: dict[int, Any], number: int, make: Callable[[int], Any]) -> Any:
+    """The value of a number, which is made once; those of far numbers are forgotten."""
+    if number not in known:
+        for old in [n for n in known if abs(n - number) > KEPT]:
+            del known[old]
+        known[number] = make(number)
+    return known[number]
