@@ -8,6 +8,7 @@ edges of strokes are found by their brightness, next to strokes that stand.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ _NOISE = 5  # levels of 255 by which codecs change what stands
 _EDGE = 0.25  # of the contrast, by which they change it beside what moves
 _CONTRAST = 30, 50  # levels of 255 from which a pixel differs, or clearly, from those beside it
 _MOVING = 0.3  # share of changes around a pixel, from which its surroundings move
+_CLEARLY = np.uint8(16)  # more than the pictures that are counted: REACH to each side, and one
 _SEEN = 3  # pictures in which a stroke differs from ground that may be as bright in others
 _SUPPORT = 3  # pixels of 5 x 5 that must stand with one
 _TILE = 16  # px; surroundings are 5 x 5 tiles
@@ -30,10 +32,22 @@ SHARES = 0.001, 0.15  # of the picture, that a display takes
 
 @dataclass(frozen=True)
 class _Picture:
-    """A picture in display values without colour, and the contrast around each pixel (uint8)."""
+    """A picture in display values without colour, and the contrast around each pixel (uint8).
+
+    `differs`: 1 where the contrast is over the first of `_CONTRAST`, plus `_CLEARLY` where it is
+    over the second; so one sum counts both.
+    """
 
     grey: np.ndarray
     contrast: np.ndarray
+    differs: np.ndarray
+
+    @classmethod
+    def of(cls, grey: np.ndarray) -> _Picture:
+        """A picture, measured."""
+        contrast = _contrast(grey)
+        over, clearly = ((contrast > least).view(np.uint8) for least in _CONTRAST)
+        return cls(grey, contrast, over + _CLEARLY * clearly)
 
 
 class Displays:
@@ -64,8 +78,10 @@ class Displays:
         back, ahead = self._run(number, -1), self._run(number, 1)
         if len(back) + len(ahead) < _STILL:
             return None
-        count, differs = self._standing(number, back, ahead)
-        stands, clearly = ((count >= _STILL) & (often >= _SEEN) for often in differs)
+        count, often = self._standing(number, back, ahead)
+        still = count >= _STILL
+        stands = still & (often & (_CLEARLY - 1) >= _SEEN)
+        clearly = still & (often >= _SEEN * _CLEARLY)
         textured = here.contrast > _CONTRAST[0]
         if not self._always and 2 * np.count_nonzero(stands) > np.count_nonzero(textured):
             return None  # the camera stands
@@ -76,39 +92,35 @@ class Displays:
         core |= stands & (_sum_around(core, 2) > 0)
         whole = core | _changing(core, textured, here.grey)
         whole |= _edges(whole, here.grey)
-        low, high = SHARES
-        return whole if self._always or low <= whole.mean() <= high else None
+        share, (low, high) = np.count_nonzero(whole) / whole.size, SHARES
+        return whole if self._always or low <= share <= high else None
 
     def _standing(
         self, number: int, back: list[np.ndarray], ahead: list[np.ndarray]
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Number of steps around a picture, without a break, in which each pixel does not change,
-        and of the pictures meanwhile in which it differs from those beside it by each of _CONTRAST:
-        ground that passes may be as bright as a stroke for a while.
+        and the sum of `differs` of the pictures meanwhile: ground that passes may be as bright as a
+        stroke for a while.
 
         `back`, `ahead`: the unchanged pixels of each step.
         """
-        here = self._picture(number).contrast
-        count = np.zeros(here.shape, np.uint8)
-        often = [(here > least).astype(np.uint8) for least in _CONTRAST]
+        often = self._picture(number).differs.copy()
+        count = np.zeros_like(often)
         for way, steps in ((-1, back), (1, ahead)):
-            going = np.ones(here.shape, bool)
+            going = np.ones_like(often)
             for k, still in enumerate(steps, 1):
                 going &= still
                 count += going
-                there = self._picture(number + way * k).contrast
-                for total, least in zip(often, _CONTRAST, strict=True):
-                    total += going & (there > least)
+                often += going * self._picture(number + way * k).differs
         return count, often
 
     def _picture(self, number: int) -> _Picture:
         if number not in self._pictures:
-            grey = self._load(number)
-            self._pictures[number] = _Picture(grey, _contrast(grey))
+            self._pictures[number] = _Picture.of(self._load(number))
         return self._pictures[number]
 
     def _run(self, number: int, way: int) -> list[np.ndarray]:
-        """The unchanged pixels, for up to REACH steps away from a picture within its shot."""
+        """The unchanged pixels (uint8, 0 or 1) of up to REACH steps from a picture in its shot."""
         found = []
         for k in range(1, REACH + 1):
             if not self._leads(number, number + way * k):
@@ -124,7 +136,7 @@ class Displays:
         one, two = self._picture(number), self._picture(number + 1)
         change = np.maximum(one.grey, two.grey) - np.minimum(one.grey, two.grey)
         least = np.minimum(one.contrast, two.contrast)
-        return change <= np.maximum(least // round(1 / _EDGE), _NOISE)
+        return (change <= np.maximum(least // round(1 / _EDGE), _NOISE)).view(np.uint8)
 
     def _forget(self, number: int) -> None:
         for kept in (self._pictures, self._steps):
@@ -134,22 +146,32 @@ class Displays:
 
 def _contrast(grey: np.ndarray) -> np.ndarray:
     """The greatest less the least of 3 x 3 pixels."""
-    most, least = grey.copy(), grey.copy()
+    return _neighbourhood(grey, (1, 1), np.maximum) - _neighbourhood(grey, (1, 1), np.minimum)
+
+
+def _neighbourhood(plane: np.ndarray, reach: tuple[int, int], choose: np.ufunc) -> np.ndarray:
+    """The sum, greatest or least up to `reach` rows and columns to each side, of what is there."""
     for axis in (0, 1):
-        for found, choose in ((most, np.maximum), (least, np.minimum)):
-            whole = np.moveaxis(found, axis, 0)
-            before = whole.copy()
-            choose(whole[1:], before[:-1], out=whole[1:])
-            choose(whole[:-1], before[1:], out=whole[:-1])
-    return most - least
+        whole = np.moveaxis(plane, axis, 0)
+        total = whole.copy(order="K")
+        for k in range(1, reach[axis] + 1):
+            choose(total[k:], whole[:-k], out=total[k:])
+            choose(total[:-k], whole[k:], out=total[:-k])
+        plane = np.moveaxis(total, 0, axis)
+    return plane
 
 
 def _tiles(plane: np.ndarray, side: int, choose: np.ufunc) -> np.ndarray:
-    """(rows, columns): the sum, least or greatest of each tile; the last ones repeat the edge."""
-    padded = np.pad(plane, [(0, -size % side) for size in plane.shape], mode="edge")
-    kind = np.uint32 if choose is np.add else None
-    strips = choose.reduce(padded.reshape(-1, side, padded.shape[1]), axis=1, dtype=kind)
-    return choose.reduce(strips.reshape(len(strips), -1, side), axis=2)
+    """(rows, columns): the sum, least or greatest of each tile; the last ones repeat the edge.
+
+    The sum over `side` rows must be below 256.
+    """
+    beyond = [(0, -size % side) for size in plane.shape]
+    if beyond != [(0, 0), (0, 0)]:
+        plane = np.pad(plane, beyond, mode="edge")
+    strips = functools.reduce(choose, (plane[k::side] for k in range(side)))
+    strips = strips.astype(np.uint32) if choose is np.add else strips
+    return functools.reduce(choose, (strips[:, k::side] for k in range(side)))
 
 
 def _spread(tiles: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
@@ -159,9 +181,7 @@ def _spread(tiles: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
 
 def _moves_around(steps: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
     """The pixels in whose surroundings many others change."""
-    still = np.zeros(shape, np.uint8)
-    for step in steps:
-        still += step
+    still = functools.reduce(np.add, steps)
     rest = _tiles(still, _TILE, np.add) / (_TILE**2 * len(steps))
     padded = np.pad(rest, 2, mode="edge")
     views = np.lib.stride_tricks.sliding_window_view(padded, (5, 5))
@@ -170,14 +190,7 @@ def _moves_around(steps: list[np.ndarray], shape: tuple[int, ...]) -> np.ndarray
 
 def _sum_around(plane: np.ndarray, reach: int) -> np.ndarray:
     """Number of pixels up to `reach` to each side that are set (uint8)."""
-    found = plane.astype(np.uint8)
-    for axis in (0, 1):
-        whole, total = np.moveaxis(found, axis, 0), np.moveaxis(found.copy(), axis, 0)
-        for k in range(1, reach + 1):
-            total[k:] += whole[:-k]
-            total[:-k] += whole[k:]
-        found = np.moveaxis(total, 0, axis)
-    return found
+    return _neighbourhood(plane.view(np.uint8), (reach, reach), np.add)
 
 
 def _changing(core: np.ndarray, candidates: np.ndarray, grey: np.ndarray) -> np.ndarray:
@@ -185,32 +198,27 @@ def _changing(core: np.ndarray, candidates: np.ndarray, grey: np.ndarray) -> np.
 
     Where more pixels are so than stand, the ground is as bright, and nothing is told.
     """
-    count = _tiles(core, _NEAR, np.add)
-    most = _tiles(np.where(core, grey, 0), _NEAR, np.maximum)
-    least = _tiles(np.where(core, grey, 255), _NEAR, np.minimum)
-    count = _near(count, 0).sum((2, 3))
-    most, least = _near(most, 0).max((2, 3)), _near(least, 255).min((2, 3))
-    places = np.nonzero(candidates & ~core & _spread(count > 0, _NEAR, core.shape))
-    tile = places[0] // _NEAR, places[1] // _NEAR
-    own, high, low = (a.astype(np.int16) for a in (grey[places], most[tile], least[tile]))
+    near = 1, 2  # tiles, along a line of text one further
+    marks = core.view(np.uint8)
+    count = _neighbourhood(_tiles(marks, _NEAR, np.add), near, np.add)
+    most = _neighbourhood(_tiles(grey * marks, _NEAR, np.maximum), near, np.maximum)
+    least = _neighbourhood(
+        _tiles(grey | (marks - np.uint8(1)), _NEAR, np.minimum), near, np.minimum
+    )
+    high, low = np.maximum(most, _ALIKE) - _ALIKE, np.minimum(least, 255 - _ALIKE) + _ALIKE
+    places = candidates & ~core & _spread(count > 0, _NEAR, core.shape)
     found = np.zeros(core.shape, bool)
-    for alike in (own >= high - _ALIKE, own <= low + _ALIKE):
-        these = np.zeros(core.shape, bool)
-        these[places] = alike
-        few = _near(_tiles(these, _NEAR, np.add), 0).sum((2, 3)) <= count
+    for compare, limit in ((np.greater_equal, high), (np.less_equal, low)):
+        these = places & compare(grey, _spread(limit, _NEAR, core.shape))
+        few = _neighbourhood(_tiles(these.view(np.uint8), _NEAR, np.add), near, np.add) <= count
         found |= these & _spread(few, _NEAR, core.shape)
     return found
 
 
-def _near(tiles: np.ndarray, beyond: int) -> np.ndarray:
-    """(rows, columns, 3, 5): every tile and those around it, along a line of text one further."""
-    padded = np.pad(tiles, ((1, 1), (2, 2)), constant_values=beyond)
-    return np.lib.stride_tricks.sliding_window_view(padded, (3, 5))
-
-
 def _edges(strokes: np.ndarray, grey: np.ndarray) -> np.ndarray:
     """Pixels next to strokes that are partly theirs: they are nearer to them than to the ground."""
-    places = np.nonzero((_sum_around(strokes, 1) > 0) & ~strokes)
+    beside = (_sum_around(strokes, 1) > 0) & ~strokes
+    places = np.divmod(np.flatnonzero(beside), strokes.shape[1])
     own = grey[places].astype(np.float32)
     stroke = _mean_near(strokes, grey, places, (-1, 0, 1))
     ground = _mean_near(_sum_around(strokes, 2) == 0, grey, places, (-6, -3, 0, 3, 6))
