@@ -16,6 +16,7 @@ import numpy as np
 from .errors import InputError
 from .shutter import Shutter
 
+_ROUNDING = 1e-9  # of an interval: what is left of equal intervals in floating point
 _LEAST = 1e-9  # share of an exposure that is worth a picture
 
 
@@ -106,14 +107,21 @@ def own_interval(times: np.ndarray, index: int) -> float:
 
 
 def evened(
-    times: np.ndarray, index: int, known: tuple[bool, bool] = (True, True)
+    times: np.ndarray,
+    index: int,
+    known: tuple[bool, bool] = (True, True),
+    tolerance: float = 0.0,
 ) -> tuple[float, float]:
     """Factors that turn a frame's way to its neighbours into ways in its own interval.
 
     To the previous, to the next frame; 1 where there is none. `known`: whether its way to each of
-    them is; where only one is, the other goes straight on from it.
+    them is; where only one is, the other goes straight on from it. `tolerance`: by how much times
+    may be rounded [s]; intervals that differ by no more than that are equal.
     """
     own = own_interval(times, index)
+    near = np.diff(times[max(index - 1, 0) : index + 2])
+    if not len(near) or np.ptp(near) <= 2 * tolerance + _ROUNDING * own:
+        return 1.0, 1.0
     back = own / (times[index] - times[index - 1]) if index > 0 else 1.0
     ahead = own / (times[index + 1] - times[index]) if index + 1 < len(times) else 1.0
     if known == (False, True):

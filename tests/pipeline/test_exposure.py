@@ -125,6 +125,15 @@ def test_ways_to_neighbours_are_told_in_the_frame_s_own_interval():
     assert evened(times, 0) == (1.0, 1.0) and own_interval(times, -1) == pytest.approx(0.3)
 
 
+def test_intervals_that_differ_by_rounding_alone_are_even():
+    steady = np.arange(8) / 30
+    assert {evened(steady, n) for n in range(8)} == {(1.0, 1.0)}
+    in_ms = np.round(np.arange(8) / 60, 3)
+    assert {evened(in_ms, n, tolerance=0.001) for n in range(8)} == {(1.0, 1.0)}
+    assert evened(in_ms, 1) != (1.0, 1.0)
+    assert evened(np.array([0.0, 0.017, 0.050]), 1, tolerance=0.001) != (1.0, 1.0)
+
+
 def test_times_must_ascend_and_rows_cannot_roll():
     with pytest.raises(InputError, match="ascend"):
         cells([0.0, 0.0], 0, 1, Shutter(180))

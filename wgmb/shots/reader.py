@@ -54,7 +54,7 @@ class ShotReader(Generic[T]):
         self.doubles: list[int] = []
         if change is not None:
             pictures = without_repeats(pictures, change, is_cut, self.doubles)
-        self._pictures, self._tolerance, self._is_cut = pictures, tolerance, is_cut
+        self._pictures, self.tolerance, self._is_cut = pictures, tolerance, is_cut
         self._known_cuts, self._flash, self._reach = known_cuts, flash, reach
         self._kept: dict[int, Picture[T]] = {}
         self._count = 0
@@ -123,7 +123,7 @@ class ShotReader(Generic[T]):
         """The picture that is shown at `time`; before the first one, that."""
         if not self._kept:
             raise NoPicturesError
-        shown = [i for i, picture in self._kept.items() if picture.time <= time + self._tolerance]
+        shown = [i for i, picture in self._kept.items() if picture.time <= time + self.tolerance]
         return max(shown, default=min(self._kept))
 
     def read_beyond(self, time: float) -> None:

@@ -155,7 +155,7 @@ class VideoFrames:
         near = [i for i in (index - 1, index, index + 1) if self._shots.same_shot(index, i)]
         times = np.array([self._shots[i].time for i in near])
         back, ahead = (self._shots.moves_on(index, i) for i in (index - 1, index + 1))
-        return evened(times, near.index(index), (back, ahead))
+        return evened(times, near.index(index), (back, ahead), self._shots.tolerance)
 
     def _paced(
         self, motion: wgpu.GPUTexture, name: str, factors: tuple[float, float]

@@ -69,7 +69,7 @@ class Thumbnail:
             planes.append(rows[:, np.arange(0, width, step) // wide])
         return self._display(planes)
 
-    @property
+    @cached_property
     def grey(self) -> np.ndarray:
         """(height, width) uint8: display values without colour."""
         coding, planes = self._integers.coding, self._colors

@@ -59,7 +59,9 @@ class PictureFrames:
         before = None if known.begins_shot else known.before
         after = None if known.ends_shot else known.after
         near = [n for n in (before, number, after) if n is not None]
-        return evened(self._times[near], near.index(number), (not known.begins, not known.ends))
+        known_ways = not known.begins, not known.ends
+        tolerance = self._reader.tolerance
+        return evened(self._times[near], near.index(number), known_ways, tolerance)
 
     def _frame(self, number: int) -> Frame:
         known = self._known(number)
