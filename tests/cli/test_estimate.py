@@ -1,5 +1,7 @@
 """The estimate of a long run."""
 
+import re
+
 import pytest
 
 from wgmb.cli.estimate import Estimate, spelled
@@ -34,8 +36,20 @@ def test_a_run_whose_later_frames_take_long_is_told_when_that_shows():
     for number in range(20):
         now[0] += 0.5 if number < 10 else 20.0
         estimate(number, "done")
-    # After the 11th frame: 9 frames of 0.5 s and one of 20 s.
-    assert lines == ["about 12 min for 289 more frames; x is quicker"]
+    # After the 12th frame: 9 frames of 0.5 s and one of 20 s, beside the slowest one.
+    assert lines == ["about 12 min for 288 more frames; x is quicker"]
+
+
+@pytest.mark.parametrize("starts", [(60, 2, 2), (60, 9, 2), (60, 2, 9), (3, 40, 2.4), (2, 2, 2)])
+def test_the_third_frame_tells_the_time_however_slow_the_start_was(starts):
+    lines, now = [], [0.0]
+    estimate = Estimate(lambda *_words: None, 3003, "x is quicker", lines.append, lambda: now[0])
+    for number, seconds in enumerate(starts):
+        now[0] += seconds
+        estimate(number, "done")
+    (line,) = lines
+    hours, minutes = (int(word) for word in re.findall(r"(\d+) (?:h|min)", line))
+    assert 60 * hours + minutes == pytest.approx(3000 * 2 / 60, rel=0.3)
 
 
 def test_frames_that_are_done_already_are_no_measure():

@@ -18,7 +18,9 @@ def spelled(seconds: float) -> str:
 class Estimate:
     """A `progress` that passes on to `tell`, and says once if the frames left take long.
 
-    `total`: number of frames; `quicker`: what takes less time; `say`: takes the line.
+    Two frames are no measure: the first one, which also started all, and the slowest one after it,
+    which may have compiled a shader. `total`: number of frames; `quicker`: what takes less time;
+    `say`: takes the line.
     """
 
     def __init__(
@@ -31,7 +33,8 @@ class Estimate:
     ):
         self._tell, self._total, self._quicker = tell, total, quicker
         self._say, self._clock = say, clock
-        self._count, self._done, self._begun = 0, 0, 0.0
+        self._count, self._done, self._last = 0, 0, 0.0
+        self._took, self._slowest = 0.0, 0.0  # seconds of the frames after the first
         self._is_said = False
 
     def __call__(self, number: int, status: str) -> None:
@@ -41,12 +44,15 @@ class Estimate:
         if status != "done" or self._is_said:
             return
         self._done += 1
-        if self._done == 1:  # it also started the GPU, and is left out
-            self._begun = self._clock()
+        now = self._clock()
+        if self._done > 1:
+            self._took += now - self._last
+            self._slowest = max(self._slowest, now - self._last)
+        self._last = now
         if self._done < FIRST:
             return
-        # Later frames may take longer: those in which something fast is searched.
-        each = (self._clock() - self._begun) / (self._done - 1)
+        # Later frames may take longer: those in which something is fast.
+        each = (self._took - self._slowest) / (self._done - 2)
         left = self._total - self._count
         if left * each > LONG:
             self._is_said = True
