@@ -55,17 +55,18 @@ class Job:
     """A run whose every frame is settled; `settle` makes one, run/job_file.py keeps it in a file.
 
     `request`: with the method, the shutter and the way to motion that were chosen. `settings`: the
-    record of every frame. `flow`: where motion comes from, in words, if the frames hold none.
-    `since`: files in the output that are older [ns since 1970] are not done; None: they may be.
+    record of every frame. `findings`: those about the whole sequence (Clip.inspect). `flow`: where
+    motion comes from, in words, if the frames hold none. `since`: files in the output that are
+    older [ns since 1970] are not done; None: they may be.
     `is_part_of_run`: another process has looked at the outputs that exist.
     """
 
     request: BlurRequest
     settings: dict[str, Any]
     numbers: list[int]
+    findings: SequenceFindings
     flow: str = ""
     since: int | None = None
-    findings: SequenceFindings | None = None
     is_part_of_run: bool = False
     clip_opened: tuple[Clip, Display | None] | None = field(default=None, repr=False)
     remarks: tuple[str, ...] = ()
@@ -87,11 +88,6 @@ class Job:
     def is_shown(self) -> bool:
         """True if a config of OpenColorIO is in use."""
         return self._opened[1] is not None
-
-    @cached_property
-    def settled(self) -> SequenceFindings:
-        """The findings about the whole sequence."""
-        return self.findings or self.clip.settle()
 
     def _check_machine(self, display: Display | None) -> None:
         """InputError if colours or the shutter's curve are others here than they were."""
@@ -192,7 +188,7 @@ class Run:
 
 
 def settle(request: BlurRequest, adapter: str | None = None) -> Job:
-    """Look at the frames, and choose what was left to them: method, motion, what vectors mean.
+    """Look at the frames (Clip.inspect), and choose what was left to them: method and motion.
 
     A GPU is opened only where the frames hold no motion and `flow` is "auto". InputError where the
     settings make no sense together.
@@ -203,6 +199,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         request.shutter.make()
     check_suffix(request.output.output)
     clip, shown = request.opened()
+    findings = clip.inspect()
     request = replace(request, shutter=request.shutter.resolved(fps=_rate(request, clip)))
     clip.builder.check_layers()
     remarks = [
@@ -212,16 +209,16 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     ]
     if request.color.space(shown) is None:
         remarks.append(_check_space(clip, shown))
-    request = replace(request, averages=_averages(clip, request))
+    request = replace(request, averages=_averages(findings, request))
     conversion = request.conversion
     if conversion:
         remarks.append(_of_conversion(conversion, clip, request.output))
         request = replace(request, output=replace(request.output, layers="picture"))
-    video, how = _motion(clip, request, adapter)
+    video, how = _motion(findings, request, adapter)
     if how:
         blur = replace(request.blur, method=request.blur.method or video.method).for_pictures()
     else:
-        blur = request.blur.resolved(clip=clip)
+        blur = request.blur.resolved(has=findings.has)
         check_needs(clip, blur.method or "")
     request = replace(request, blur=blur, video=video)
     blur, output = request.blur, request.output
@@ -244,7 +241,8 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         settings["flow"] = how
         remarks.append(f"the frames have no vectors; motion: {how}")
     told = tuple(filter(None, remarks))
-    return Job(request, settings, clip.numbers, how, clip_opened=(clip, shown), remarks=told)
+    opened = clip, shown
+    return Job(request, settings, clip.numbers, findings, how, clip_opened=opened, remarks=told)
 
 
 def _rate(request: BlurRequest, clip: Clip) -> Fraction | None:
@@ -300,22 +298,23 @@ def _check_space(clip: Clip, display: Display | None) -> str:
     return f"{source.path}: {said} is not in {display.config.name}, so it is taken as {found.text}"
 
 
-def _motion(clip: Clip, request: BlurRequest, adapter: str | None) -> tuple[VideoSettings, str]:
+def _motion(
+    findings: SequenceFindings, request: BlurRequest, adapter: str | None
+) -> tuple[VideoSettings, str]:
     """Source of the motion for frames without vectors, decided, and in words."""
-    if not _lacks_motion(clip):
+    if not _lacks_motion(findings):
         return request.video, ""
     return request.video.chosen(gpu.open_device(adapter))
 
 
-def _lacks_motion(clip: Clip) -> bool:
+def _lacks_motion(findings: SequenceFindings) -> bool:
     """Return True if the frames can be read, and motion must come from their pictures."""
-    has = clip.has if len(clip.on_disk) > 1 else ()
-    return bool(has) and "motion" not in has
+    return len(findings.on_disk) > 1 and bool(findings.has) and "motion" not in findings.has
 
 
-def _averages(clip: Clip, request: BlurRequest) -> bool:
+def _averages(findings: SequenceFindings, request: BlurRequest) -> bool:
     """Return True if frames without motion are averaged; InputError where that changes nothing."""
-    if request.video.flow != "none" or not _lacks_motion(clip):
+    if request.video.flow != "none" or not _lacks_motion(findings):
         return False
     if request.blur.holdout:
         raise InputError("`holdout` needs motion; `flow` none averages whole pictures")

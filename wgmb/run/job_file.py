@@ -47,7 +47,7 @@ class Stored:
 
     def check(self, chosen: Iterable[int], name: str = "the job") -> None:
         """InputError if files that these frames, or the findings, depend on have changed."""
-        clip, there = self.job.clip, set(self.job.settled.on_disk)
+        clip, there = self.job.clip, set(self.job.findings.on_disk)
         for number in sorted(_needed(self.job, chosen)):
             if number not in there:
                 if is_pattern(clip.pattern) and (new := clip.dependencies.of(number)[0]).is_file():
@@ -69,7 +69,7 @@ class Stored:
             "flow": job.flow,
             "since": job.since,
             "numbers": ranges(job.numbers),
-            "settled": job.settled.plain(),
+            "settled": job.findings.plain(),
             "chunk": self.chunk,
             "inputs": {str(n): known for n, known in self.inputs.items()},
         }
@@ -90,8 +90,7 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
             "write frames, such as out.####.exr"
         )
     request = anchored(_with_config(job), Path.cwd())
-    settled, clip = job.settled, job.clip
-    there = set(settled.on_disk)
+    clip, there = job.clip, set(job.findings.on_disk)
     inputs = {
         n: [value for path in clip.dependencies.of(n) for value in _size_and_time(path)]
         for n in sorted(_needed(job, job.numbers if frames is None else frames) & there)
@@ -99,7 +98,6 @@ def stored(job: Job, chunk: int, *, frames: Sequence[int] | None = None) -> Stor
     part = replace(
         job,
         request=request,
-        findings=settled,
         is_part_of_run=True,
         clip_opened=None,
         remarks=(),
@@ -154,9 +152,9 @@ def _stored_of(content: dict[str, Any]) -> Stored:
         restored(BlurRequest, content["request"]),
         dict(content["settings"]),
         numbers(content["numbers"]),
+        findings_of(content["settled"]),
         typed("flow", content["flow"], str),
         typed("since", content["since"], int | None),
-        findings_of(content["settled"]),
         is_part_of_run=True,
     )
     inputs = {
@@ -228,7 +226,7 @@ def anchored(request: BlurRequest, folder: Path) -> BlurRequest:
 def _needed(job: Job, chosen: Iterable[int]) -> set[int]:
     """Frames on which these, and what was found out about all, depend."""
     near = FAR + 1 if job.flow else 1
-    there = job.settled.on_disk
+    there = job.findings.on_disk
     looked_at = (there[0], there[len(there) // 2], there[-1])
     reach = {n + step for n in chosen for step in range(-near, near + 1)}
     return reach | {n + step for n in looked_at for step in (-1, 0, 1)}

@@ -31,8 +31,9 @@ class VectorsRequest:
     def open(self, device: wgpu.GPUDevice | str | None = None) -> VectorsRun:
         """Open frames, GPU and output; InputError for frames without motion."""
         clip = self.input.open(self.pattern)
+        has = clip.inspect().has
         settings = record(self.input, **{"as": self.program}, max_displace=self.max_displace)
-        if clip.has and "motion" not in clip.has:
+        if has and "motion" not in has:
             raise InputError(f"{self.pattern}: no motion to write (neither vectors nor a camera)")
         blur = Blur("tap", device=device)
         files = VectorOutput(

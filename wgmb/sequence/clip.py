@@ -52,11 +52,11 @@ class Clip:
 
     Iteration gives Frames in the order of `numbers`, and `clip[7]` frame 7, each with its
     neighbours; `len(clip)` counts them. `numbers` are the requested frames, `on_disk` all existing
-    ones. `finding` describes the detected vector convention; `stray_cuts` are the given cuts at
-    frames that do not exist. Of the frames read so far, `cuts` are those after a camera cut,
-    `unread` the neighbours that could not be read, `sizes` the sizes, `notes` messages for the
-    user, each with its frames, and `absent` the masks by index or id (`IndexOB=4`,
-    `CryptoObject=0x...`) that none of them has.
+    ones; `stray_cuts` are the given cuts at frames that do not exist. `inspect` determines what
+    holds for the whole sequence; `has`, `finding` and `views` report it. Of the frames read so far,
+    `cuts` are those after a camera cut, `unread` the neighbours that could not be read, `sizes` the
+    sizes, `notes` messages for the user, each with its frames, and `absent` the masks by index or
+    id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
 
     Its parts, for what it has no method for: `cache` (files), `builder` (layers), `masks`, and
     `dependencies` (the files that a result depends on).
@@ -88,7 +88,7 @@ class Clip:
         InputError for missing files, gaps and settings that do not fit.
         """
         _check_kind(pattern)
-        self._space, self._settled, self._max_mb = space, settled, max_mb
+        self._space, self._findings, self._max_mb = space, settled, max_mb
         self._cut_list = CutList(cuts or "")
         self.pattern, self.passes, self.view = str(pattern), passes or Passes(), view
         self._files = SequenceFiles(self.pattern, self.passes.also, settled)
@@ -104,7 +104,7 @@ class Clip:
     def _begin(self) -> None:
         """Nothing has been read yet."""
         self.expansion = Expansion()
-        settled, files, passes = self._settled, self._files, self.passes
+        known, files, passes = self._findings, self._files, self.passes
         self.cache = cache = FrameCache(
             files,
             passes,
@@ -120,38 +120,59 @@ class Clip:
         self.masks = Masks(
             passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
         )
-        self._finder = ConventionFinder(cache, settled.finding if settled else None)
+        self._finder = ConventionFinder(cache, known.finding if known else None)
         self.dependencies = Dependencies(files, self.masks, (passes.camera, self._cut_list.path))
         self.builder = FrameBuilder(cache, self._finder, self.masks, self._cameras)
         self._neighbours = Neighbours(cache, self.builder, self._cut_list.is_search)
-        if settled is not None:
-            self._neighbours.settle(settled.beyond, settled.is_joined)
+        if known is not None:
+            self._neighbours.settle(known.beyond, known.is_joined)
             self.masks.take_names_as_found()
-            self.notes |= {text: list(self.numbers) for text in settled.notes}
+            self.notes |= {text: list(self.numbers) for text in known.notes}
 
-    def settle(self) -> SequenceFindings:
-        """Determine all findings that depend on the whole sequence, for `Clip(settled=)`.
+    def inspect(self) -> SequenceFindings:
+        """Look at the sequence, once: views, meaning of vectors and depth, inputs, and edges.
 
-        Parts of the sequence that are blurred separately then give the same pictures as the whole,
-        even if the files on disk have changed.
+        A run begins with this: here the first file is opened, and vectors are tested on pictures.
+        All frames on disk are considered, so that the findings are independent of `frames`.
+        Afterwards, no property of the Clip opens a file.
         """
-        if self._settled is None:
-            self.masks.check()
+        if self._findings is None:
+            views, finding = self.views, self._finder.finding
+            has, depth_kind = self._has(), self._finder.depth_kind
             beyond, is_joined = self._neighbours.beyond, self._neighbours.is_joined
-            depth_kind = self._finder.depth_kind
-            notes = tuple(text for text, at in self.notes.items() if len(at) == len(self.numbers))
-            self._settled = SequenceFindings(
+            of_all = [text for text, at in self.notes.items() if at == self.numbers]
+            if (note := self._neighbours.beyond_note) and note not in of_all:
+                of_all.append(note)
+            self._findings = SequenceFindings(
                 tuple(self.on_disk),
-                self.views,
-                self._finder.finding,
+                views,
+                tuple(sorted(has)),
+                finding,
                 depth_kind,
                 tuple(sorted(self._known_cuts)),
                 beyond,
                 is_joined,
-                notes,
+                tuple(of_all),
             )
-            self._files.settle(self._settled)
-        return self._settled
+        return self._findings
+
+    def _has(self) -> frozenset[str]:
+        """Inputs of the first readable frame."""
+        for number in self.on_disk:
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                return self._neighbours.frame(self.source(number), frozenset()).has
+        return frozenset()
+
+    def settle(self) -> SequenceFindings:
+        """Keep to the findings of `inspect` from now on; they are for `Clip(settled=)` too.
+
+        Parts of the sequence that are blurred separately then give the same pictures as the whole,
+        even if the files on disk have changed.
+        """
+        self.masks.check()
+        findings = self.inspect()
+        self._files.settle(findings)
+        return findings
 
     def part(self, numbers: Sequence[int]) -> Clip:
         """A Clip of some of the frames, with the findings of this one and nothing read yet."""
@@ -218,14 +239,8 @@ class Clip:
 
     @property
     def has(self) -> frozenset[str]:
-        """Inputs available in the first readable frame (see Frame.has).
-
-        All frames on disk are considered, so that the result is independent of `frames`.
-        """
-        for number in self.on_disk:
-            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-                return self._neighbours.frame(self.source(number), frozenset()).has
-        return frozenset()
+        """Inputs available in the first readable frame (see Frame.has), as `inspect` finds them."""
+        return frozenset(self.inspect().has)
 
     def made_of(self, number: int, reach: int) -> dict[str, Any]:
         """Return the inputs of frame `number` apart from the settings, as values for JSON.

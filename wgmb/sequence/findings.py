@@ -21,6 +21,8 @@ class SequenceFindings:
     """Every frame that there is."""
     views: tuple[str, ...]
     """Names of the views, the default one first."""
+    has: tuple[str, ...]
+    """Inputs of the first readable frame (see Frame.has), sorted; none if no frame is readable."""
     finding: ConventionFinding
     """Meaning of the vectors."""
     depth_kind: str
@@ -40,6 +42,7 @@ class SequenceFindings:
         return {
             "on_disk": ranges(self.on_disk),
             "views": list(self.views),
+            "has": list(self.has),
             "finding": finding,
             "depth_kind": self.depth_kind,
             "cuts": list(self.cuts),

@@ -60,6 +60,7 @@ class Neighbours:
         self._placed: OrderedDict[tuple[int, str | None], tuple[Frame, Window, Frame]] = (
             OrderedDict()
         )
+        self.beyond_note = ""  # a line for the user about `beyond`; "" without such sides
         self._jumps: dict[int, list[int]] = {}
         self._cuts_to: dict[tuple[int, int], bool] = {}
         self._panoramas: set[tuple[int, str | None]] = set()
@@ -75,19 +76,9 @@ class Neighbours:
         self._alone.clear()
         self._placed.clear()
 
-    @property
-    def beyond(self) -> Sides:
-        """Sides of the data window beyond which the picture is unknown."""
-        return self._cut_through
-
-    @property
-    def is_joined(self) -> bool:
-        """True if the left and the right edge of these frames seem to be one meridian."""
-        return self._joined
-
     def settle(self, beyond: Sides, is_joined: bool) -> None:
         """Take what was found out about all frames as `beyond` and `is_joined`."""
-        self._cut_through, self._joined = beyond, is_joined
+        self.beyond, self.is_joined = beyond, is_joined
 
     # ---- frames ----------------------------------------------------------------------------
 
@@ -324,7 +315,7 @@ class Neighbours:
             reason = "its attribute envmap says so"
         elif not panorama.has_shape(source):
             return False
-        elif self._joined:
+        elif self.is_joined:
             reason = "2:1, and its left edge goes on where the right one ends"
         elif panorama.crosses(frame.motion):
             reason = "2:1, and vectors are longer than half its width"
@@ -342,10 +333,16 @@ class Neighbours:
         return is_whole and (source.number, source.view) in self._panoramas
 
     @cached_property
-    def _joined(self) -> bool:
-        """True if the edges of these frames join: the first, the middle and the last on disk."""
-        pictures = [source.rgba for source in self._some_leaders() if panorama.has_shape(source)]
-        return bool(pictures) and all(map(panorama.joins, pictures))
+    def is_joined(self) -> bool:
+        """True if the left and the right edge of these frames seem to be one meridian.
+
+        The first, the middle and the last frame on disk tell, if the first has the shape.
+        """
+        leaders = self._some_leaders()
+        first = next(leaders, None)
+        if first is None or not (panorama.has_shape(first) and panorama.joins(first.rgba)):
+            return False
+        return all(panorama.joins(one.rgba) for one in leaders if panorama.has_shape(one))
 
     def _some_leaders(self) -> Iterator[FrameFile]:
         """The first, the middle and the last frame on disk, as far as their pictures are readable.
@@ -359,9 +356,17 @@ class Neighbours:
                 _ = source.rgba
                 yield source
 
-    @cached_property
+    @property
     def _cut_through(self) -> Sides:
-        """The sides at which data windows cut through the picture.
+        """`beyond`, where it matters to a frame; the user is told."""
+        sides = self.beyond
+        if self.beyond_note:
+            self._stored.notes.setdefault(self.beyond_note, list(self._stored.numbers))
+        return sides
+
+    @cached_property
+    def beyond(self) -> Sides:
+        """Sides of the data window beyond which the picture is unknown: left, top, right, bottom.
 
         The first, the middle and the last frame on disk tell, so that the result is independent
         of `frames`: such a side lies in the same place in all of them, and is covered.
@@ -381,6 +386,8 @@ class Neighbours:
                 places[i].add(end)
                 closed[i] &= full and end != border
                 within[i] &= end > border if i < 2 else end < border
+            if not any(closed):  # the other frames cannot alter that
+                break
         left, top, right, bottom = (
             full and len(ends) == 1 for full, ends in zip(closed, places, strict=True)
         )
@@ -388,9 +395,8 @@ class Neighbours:
         told = [name for name, *both in zip(_SIDES, found, within, strict=True) if all(both)]
         if told:
             where = ", ".join(told)
-            text = (
+            self.beyond_note = (
                 f"the picture goes on beyond the data window ({where}): what lies there is taken "
                 "as unknown; `outside='nothing'` takes it as empty"
             )
-            self._stored.notes[text] = list(self._stored.numbers)
         return found

@@ -1,5 +1,6 @@
 """Settings of the blur: the method, and the options of all methods."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self, TypeVar
 
@@ -10,7 +11,6 @@ from ..methods.options import Option, options_of
 from ..pipeline.arguments import checked
 from ..pipeline.blur import Blur
 from ..scene.scene import Scene
-from ..sequence.clip import Clip
 from ..shutter import Shutter
 
 
@@ -75,9 +75,9 @@ class BlurSettings:
     max_blur: float | None = None
     "Maximum blur length in pixels."
 
-    def resolved(self, scene: Scene | None = None, clip: Clip | None = None) -> Self:
-        """Return a copy; an unset method is chosen by the scene or the passes in the files."""
-        suited = "gather" if clip is None else default_method(clip.has)
+    def resolved(self, scene: Scene | None = None, has: Collection[str] | None = None) -> Self:
+        """Return a copy; an unset method is chosen by the scene, or by what frames have."""
+        suited = "gather" if has is None else default_method(has)
         if scene is not None and scene.has_volumes:
             suited = "volume"
         return replace(self, method=self.method or suited)

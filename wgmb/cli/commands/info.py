@@ -90,6 +90,7 @@ def describe(
         raise InputError(f"output {output}: must be an image, {', '.join(stills.SUFFIXES)}")
     if output is not None:
         refuse_inputs(output.parent, [output.name], [output], clip.dependencies.every())
+    clip.inspect()
     source = clip.source(clip.numbers[0])
     lines = [("file", str(source.path))]
     if len(clip.numbers) > 1:
