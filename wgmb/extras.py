@@ -44,6 +44,7 @@ EXTRAS = {
     "PIL": Package("images", "Pillow", "pillow"),
     "PyOpenColorIO": Package("ocio", "OpenColorIO", "opencolorio"),
     "pygfx": Package("pygfx", "pygfx", "pygfx"),
+    "pytest": Package("testing", "pytest", "pytest"),
     "rendercanvas": Package("view", "rendercanvas", "rendercanvas"),
     "rich": Package("cli", "rich", "rich"),
     "tifffile": Package("images", "tifffile", "tifffile"),

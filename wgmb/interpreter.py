@@ -23,7 +23,7 @@ def environment() -> dict[str, str]:
     """This process's environment for another Python, and for those that it starts in turn."""
     found = os.environ | {"PYTHONSAFEPATH": "1"}
     folders = found.pop("PYTHONPATH", "").split(os.pathsep)
-    if kept := [folder for folder in folders if not _is_current(folder)]:
+    if kept := [folder for folder in folders if not is_current(folder)]:
         found["PYTHONPATH"] = os.pathsep.join(kept)
     return found
 
@@ -33,7 +33,7 @@ def leave_current_folder() -> None:
 
     `python -m` puts it first on the path, and so does an empty entry of PYTHONPATH.
     """
-    sys.path[:] = [folder for folder in sys.path if not _is_current(folder)]
+    sys.path[:] = [folder for folder in sys.path if not is_current(folder)]
     kept = environment()
     if "PYTHONPATH" not in kept:
         os.environ.pop("PYTHONPATH", None)
@@ -51,7 +51,7 @@ def name_runtime_folder() -> None:
         os.environ["XDG_RUNTIME_DIR"] = os.devnull
 
 
-def _is_current(folder: str) -> bool:
+def is_current(folder: str) -> bool:
     """Return True for the current folder, unless wgmb itself is installed there."""
     try:
         place = os.path.realpath(folder)  # of an empty name, the current folder

@@ -6,7 +6,7 @@ import pytest
 
 import make_frames as make
 from wgmb.cli import app
-from wgmb.methods import FRAME_METHODS, METHODS
+from wgmb.methods import METHODS, frame_methods
 
 pytestmark = pytest.mark.fast
 
@@ -75,7 +75,7 @@ def test_a_help_offers_only_methods_that_can_work(said, command):
     text = " ".join(re.sub(r"[│\n]", " ", said(command, "--help")).split())
     listed = re.search(r"--method TEXT ([a-z, ]+)", text)
     assert listed
-    wanted = METHODS if command == "render" else FRAME_METHODS
+    wanted = METHODS if command == "render" else frame_methods()
     assert set(re.findall(r"[a-z]+", listed[1])) >= set(wanted)
     for name in METHODS.keys() - set(wanted):
         assert name not in text

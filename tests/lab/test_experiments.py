@@ -179,7 +179,7 @@ def test_the_page_of_experiments_takes_its_tables_from_reports(chen):
 
 
 def test_chen_without_fusion_says_so(lab, monkeypatch):
-    monkeypatch.delitem(METHODS, "fusion")
+    monkeypatch.delitem(METHODS._loaded, "fusion")
     with pytest.raises(InputError, match="needs the method fusion"):
         made(lab, "chen")
 

@@ -29,7 +29,7 @@ LAYERS = [
     {"output"},
     {"settings"},
     {"run"},
-    {"hosts", "lab", "viewer"},  # never each other
+    {"hosts", "lab", "testing", "viewer"},  # never each other
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
 ]
@@ -52,6 +52,7 @@ HOMES = {
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},
     "glfw": {"viewer"},
+    "pytest": {"testing"},
     "rendercanvas": {"viewer"},
     "ipywidgets": {"hosts"},
     "pygfx": {"hosts"},

@@ -22,6 +22,7 @@ import wgmb
 color = np.zeros((8, 8, 3), np.float32)
 motion = np.zeros((8, 8, 2), np.float32)
 blur = wgmb.Blur("gather", shutter=180, curve="cosine", samples="auto", reach=2)
+wgmb.Blur(wgmb.METHODS["tap"], shutter=90, own=3)
 picture = blur(color, to_next=motion, depth=np.ones((8, 8)))
 total: float = float(wgmb.blur(color, motion, path="straight", samples=8).sum())
 wgmb.blur_video("in.mp4", "out.mp4", fps=60, shutter=180, holdout="mask.png", flow="dis")

@@ -70,6 +70,9 @@ def test_every_kind_of_name_is_looked_at(tmp_path):
 
 
 def test_light_before_and_after_a_blur_is_named_in_few_modules():
-    """A change of it is made in color/highlights.py, video/planes/ and their shader."""
+    """A change of it is made in color/highlights.py, video/planes/ and their shader.
+
+    The ninth is methods/contract_check.py, which lists the options of wgmb by name.
+    """
     named = [f for f in PACKAGE.rglob("*.py") if re.search(r"\bhighlights\b", f.read_text("utf-8"))]
-    assert len(named) <= 8, named
+    assert len(named) <= 9, named

@@ -16,8 +16,8 @@ from wgmb.errors import check_choice
 PACKAGE = Path(wgmb.__file__).parent
 OPTION = re.compile(r"(?:^|[\s`'\"])--[a-z][a-z-]*(?=[\s,;.`'\"]|$)")
 ARGUMENT = re.compile(r"`(\w+)(?:=[^`]*)?`")
-# They speak to people who see options, a window, or Python alone; of pip's options.
-OTHERS = {"cli", "viewer", "hosts", "extras.py"}
+# They speak to people who see options, a window, Python alone, or pytest; of pip's options.
+OTHERS = {"cli", "viewer", "hosts", "testing", "extras.py"}
 LIBRARY = [
     f for f in sorted(PACKAGE.rglob("*.py")) if f.relative_to(PACKAGE).parts[0] not in OTHERS
 ]

@@ -158,11 +158,24 @@ def _command(words: list[str]) -> int:
         app.config = _config(words)
         result = app(words, exit_on_error=False, print_error=False)
         terminal.flush()
-    except Exception:  # of a library that was left half done, or of a terminal that is closed
+    except Exception as error:  # of a library left half done, or of a terminal that is closed
         terminal.check()
+        _tell_faults(words, str(error))
         raise
+    _tell_faults(words)
     terminal.check()  # a window's loop, which handles signals itself, just ends
     return result if isinstance(result, int) else DONE
+
+
+def _tell_faults(words: list[str], message: str = "") -> None:
+    """Say which methods of other packages cannot be used, unless an error's message has it."""
+    if "wgmb.methods" not in sys.modules or {"-q", "--quiet"} & set(words):
+        return
+    from ..methods import METHODS
+
+    for fault in METHODS.faults.values():
+        if fault not in message:
+            terminal.note(fault)
 
 
 def _check_text(words: list[str]) -> None:

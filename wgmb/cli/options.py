@@ -11,7 +11,7 @@ from cyclopts import Parameter, Token
 
 from ..io import exr
 from ..io.suffixes import STILLS, VIDEOS
-from ..methods import FRAME_METHODS, METHODS
+from ..methods import METHODS, frame_methods
 from ..methods.options import options_of
 from ..scene import builtin
 from ..sequence.layers.vectors import CONVENTIONS
@@ -28,8 +28,9 @@ from ..settings.video import VideoSettings
 from ..shutter import CURVES, PHASES
 from .help import BLUR, COLOR, INPUT, MAIN, METHOD, OUTPUT, RUN, SHUTTER, VIDEO
 
-_SCENE_METHODS = [name for name in METHODS if name not in FRAME_METHODS]
-_OF_FRAMES = {name for method in FRAME_METHODS for name in options_of(METHODS[method].Options)}
+_FRAME_METHODS = frame_methods()
+_SCENE_METHODS = [name for name in METHODS if name not in _FRAME_METHODS]
+_OF_FRAMES = {name for method in _FRAME_METHODS for name in options_of(METHODS[method].Options)}
 _OF_SCENES = METHOD_OPTIONS.keys() - _OF_FRAMES  # options that only methods for scenes have
 
 _Settings = TypeVar("_Settings", bound=type)
@@ -96,7 +97,7 @@ class BlurOptions(BlurSettings):
     method: Annotated[
         str | None,
         Parameter(
-            help=f"{', '.join(FRAME_METHODS)}, for scenes also {', '.join(_SCENE_METHODS)}; "
+            help=f"{', '.join(_FRAME_METHODS)}, for scenes also {', '.join(_SCENE_METHODS)}; "
             "by default the one that suits."
         ),
     ] = None
@@ -110,8 +111,8 @@ class FrameBlurOptions(BlurOptions):
     method: Annotated[
         str | None,
         Parameter(
-            help=f"{', '.join(FRAME_METHODS)}; default: gather with depth or searched motion, else "
-            "tap.",
+            help=f"{', '.join(_FRAME_METHODS)}; default: gather with depth or searched motion, "
+            "else tap.",
             group=MAIN,
         ),
     ] = None

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -160,13 +161,17 @@ def reads_storage(device: wgpu.GPUDevice) -> bool:
     return info["vendor"] == "llvmpipe" and info["backend_type"] == "Vulkan"
 
 
-def kernel(device, file: str, texels: dict[str, str] | None = None, **constants: float) -> Kernel:
+def kernel(
+    device, file: str | Path, texels: dict[str, str] | None = None, **constants: float
+) -> Kernel:
     """The compiled kernel of `wgsl/<file>`, kept for the next time it is asked for.
+
+    `file`: also the absolute path of a shader elsewhere, which may include those of wgsl/ too.
 
     `texels` are the storage texel formats (`Output`), `constants` the overrides.
     """
     formats = tuple(sorted((texels or {}).items()))
-    return _kernel(device, file, formats, tuple(sorted(constants.items())))
+    return _kernel(device, str(file), formats, tuple(sorted(constants.items())))
 
 
 def stored(view: wgpu.GPUTextureView) -> str:

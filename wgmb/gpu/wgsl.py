@@ -127,10 +127,11 @@ def texel_aliases(text: str) -> dict[str, str]:
 
 @cache
 def load(name: str) -> WgslSource:
-    """Read `wgsl/<name>` and append what it includes.
+    """Read `wgsl/<name>`, or a file with an absolute path, and append what it includes.
 
     WGSL does not care about the order of declarations, so includes go to the end
-    and the file keeps its own line numbers in error messages.
+    and the file keeps its own line numbers in error messages. A file outside of wgsl/ may include
+    those that lie beside it, too.
     """
     todo, text, files = [(name, name)], "", []
     while todo:
@@ -139,12 +140,23 @@ def load(name: str) -> WgslSource:
             continue
         path = ROOT / current
         if not path.is_file():
-            raise ShaderError(f"{asker}: no such file wgsl/{current}")
+            raise ShaderError(f"{asker}: no such file {_file_name(current)}")
         files.append((current, text.count("\n") + 1))
         body = path.read_text(encoding="utf-8")
-        todo += [(i, current) for i in re.findall(r"^//#include (\S+)$", body, re.M)]
+        asked = re.findall(r"^//#include (\S+)$", body, re.M)
+        todo += [(_included(name, current), current) for name in asked]
         text += body.rstrip("\n") + "\n"
     return WgslSource(text, tuple(files))
+
+
+def _included(name: str, asker: str) -> str:
+    """The file that an include of a file names."""
+    beside = Path(asker).parent / name
+    return str(beside) if Path(asker).is_absolute() and beside.is_file() else name
+
+
+def _file_name(name: str) -> str:
+    return name if Path(name).is_absolute() else f"wgsl/{name}"
 
 
 @cache

@@ -105,7 +105,7 @@ class Explorer(ipywidgets.VBox):
         if key not in self._blurs:
             for old in [k for k in self._blurs if k.split()[0] == method]:
                 del self._blurs[old]
-            self._blurs[key] = Blur(method, samples=samples, device=self._device)  # pyright: ignore[reportArgumentType]
+            self._blurs[key] = Blur(METHODS[method], samples=samples, device=self._device)
         blur = self._blurs[key]
         blur.shutter = degrees
         return blur(self._frame)

@@ -72,7 +72,7 @@ class Candidate:
     def blur(self, samples: int, shutter: Shutter, device) -> Blur:
         """Compiled for one number of samples."""
         return Blur(
-            self.method,  # pyright: ignore[reportArgumentType]
+            METHODS[self.method],
             shutter=shutter,
             samples=samples,
             device=device,

@@ -18,6 +18,7 @@ import wgpu
 from ..errors import InputError
 from ..gpu import timing
 from ..gpu.textures import TexturePool
+from ..methods import METHODS
 from ..metrics import METRICS, measure
 from ..pipeline.arguments import MOST_SAMPLES, most_samples
 from ..pipeline.blur import Blur
@@ -128,7 +129,7 @@ class Laboratory:
 
     def _fitting(self, case: Case, c: Candidate, known, budget: float, frame_seconds: float) -> int:
         """The samples that take about `budget` seconds: guessed, tried, and corrected twice."""
-        known, most = list(known), most_samples(c.method, self.device)
+        known, most = list(known), most_samples(METHODS[c.method], self.device)
         for _ in range(3):
             samples = _guess(known, budget, most)
             timer = self.timer(case, c.blur(samples, case.shutter, self.device), c)

@@ -6,28 +6,43 @@ from collections.abc import Collection
 
 from ..errors import InputError, did_you_mean
 from .accumulate import Accumulate
+from .contract import Method
 from .distributed import Distributed
 from .fusion import Fusion
 from .gather import Gather
 from .keywords import MethodName
+from .registry import Methods
 from .reproject import Reproject
 from .tap import Tap
 from .tiles import Tiles
 from .volume import Volume
 
-_ALL = (Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed)
-METHODS: dict[str, type] = {m.name: m for m in _ALL}
-FRAME_METHODS = tuple(m.name for m in _ALL if "scene" not in m.needs)
-"""Methods that blur frames; the others draw scenes."""
+METHODS = Methods((Tap, Tiles, Gather, Fusion, Reproject, Volume, Accumulate, Distributed))
+"""The methods by name; see registry.py."""
 
 
-def check_method(name: object, known: Collection[str] = tuple(METHODS)) -> None:
-    """InputError unless `name` is one of the `known` methods, which may be FRAME_METHODS."""
+def frame_methods() -> list[str]:
+    """Names of the methods that blur frames; the others draw scenes."""
+    return [name for name, method in METHODS.items() if "scene" not in method.needs]
+
+
+def check_method(name: object, *, of_frames: bool = False) -> None:
+    """InputError unless `name` is one of the methods, or of those that blur frames."""
     if not isinstance(name, str) or name not in METHODS:
+        if isinstance(name, str) and name in METHODS.faults:
+            raise InputError(METHODS.faults[name])
+        known = frame_methods() if of_frames else list(METHODS)
         hint = did_you_mean(name, known)
         raise InputError(f"unknown method {name!r}; available: {', '.join(known)}{hint}")
-    if name not in known:
-        raise InputError(f"method {name!r} draws built-in scenes; for frames: {', '.join(known)}")
+    if of_frames:
+        check_takes_frames(METHODS[name])
+
+
+def check_takes_frames(method: type[Method]) -> None:
+    """InputError if the method draws scenes."""
+    if "scene" in method.needs:
+        known = ", ".join(frame_methods())
+        raise InputError(f"method {method.name!r} draws built-in scenes; for frames: {known}")
 
 
 def default_method(has: Collection[str]) -> MethodName:

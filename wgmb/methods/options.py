@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields
 from functools import cache
 from types import MappingProxyType, UnionType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from ..errors import InputError, check_choice
 
@@ -87,10 +87,12 @@ def options_of(options: type[MethodOptions]) -> Mapping[str, Option]:
 
 
 def _option(field: Field[Any], hint: Any) -> Option:
-    kind, *notes = typing.get_args(hint)
+    kind, *notes = typing.get_args(hint) or (hint,)
     if isinstance(kind, UnionType):  # ... | None
         kind = next(k for k in typing.get_args(kind) if k is not type(None))
     choices = typing.get_args(kind) if typing.get_origin(kind) is Literal else ()
     range_ = next((note for note in notes if isinstance(note, Range)), None)
-    help_ = next(note for note in notes if isinstance(note, str))
+    help_ = next((note for note in notes if isinstance(note, str)), None)
+    if typing.get_origin(hint) is not Annotated or help_ is None:
+        raise InputError(f"option {field.name} must be Annotated with its type and its help")
     return Option(field.name, str if choices else kind, field.default, choices, range_, help_)

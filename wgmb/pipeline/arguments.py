@@ -11,6 +11,8 @@ import wgpu
 from .. import gpu
 from ..errors import InputError, check_choice, did_you_mean_setting
 from ..methods import METHODS, check_method
+from ..methods.contract import Method
+from ..methods.contract_check import check_contract
 from ..methods.options import options_of
 from ..shutter import Shutter, Weight
 
@@ -20,8 +22,17 @@ AUTO_SAMPLES = 64  # the most that "auto" takes a pixel
 OUTPUTS = ("rgba32float", "rgba16float")
 
 
+def method_of(method: str | type[Method]) -> type[Method]:
+    """The class of a method that is named, or is the class itself; InputError if it is neither."""
+    if isinstance(method, type):
+        check_contract(method)
+        return method
+    check_method(method)
+    return METHODS[method]
+
+
 def checked(
-    method: str,
+    method: type[Method],
     samples: int | str | None = None,
     jitter: float = 0.0,
     max_blur: float | None = None,
@@ -32,10 +43,9 @@ def checked(
 
     InputError where one of them makes no sense; no device is opened.
     """
-    check_method(method)
-    auto = samples == "auto" and getattr(METHODS[method], "adaptive", False)
+    auto = samples == "auto" and getattr(method, "adaptive", False)
     if samples is None:
-        samples = getattr(METHODS[method], "samples", SAMPLES)
+        samples = getattr(method, "samples", SAMPLES)
     samples = AUTO_SAMPLES if samples == "auto" else samples
     if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
         raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
@@ -44,9 +54,9 @@ def checked(
     if max_blur is not None and not max_blur >= 0:
         raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
     check_choice("output", output, OUTPUTS)
-    known = options_of(METHODS[method].Options)
+    known = options_of(method.Options)
     if unknown := (options or {}).keys() - known.keys():
-        raise InputError(_no_option(method, sorted(unknown), list(known)))
+        raise InputError(_no_option(method.name, sorted(unknown), list(known)))
     return int(samples), auto
 
 
@@ -64,11 +74,11 @@ _OF_ALL = ["shutter", "curve", "samples", "jitter", "max_blur", "device", "outpu
 """Arguments of every Blur."""
 
 
-def most_samples(method: str, device: wgpu.GPUDevice) -> int:
+def most_samples(method: type[Method], device: wgpu.GPUDevice) -> int:
     """The most samples that a pixel may take on the device."""
     if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
         return MOST_SAMPLES
-    return getattr(METHODS[method], "most_in_software", MOST_SAMPLES)
+    return getattr(method, "most_in_software", MOST_SAMPLES)
 
 
 def shutter_of(shutter: Shutter | float, curve: str | Weight | None = None) -> Shutter:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 import wgpu
@@ -31,7 +31,7 @@ from ..gpu_frame.views import (
     check_view,
     view_of,
 )
-from ..methods import FRAME_METHODS, METHODS, check_method
+from ..methods import METHODS, check_takes_frames
 from ..methods.contract import (
     Inputs,
     Method,
@@ -43,13 +43,14 @@ from ..methods.contract import (
 from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter, Weight
-from .arguments import checked, most_samples, shutter_of
+from .arguments import checked, method_of, most_samples, shutter_of
 
 
 class Blur:
     """A compiled blur method. Call it with arrays, or `encode` it into your own command encoder.
 
-    `method`: a name in METHODS; its own options follow as keywords.
+    `method`: a name in METHODS, or a class that keeps the contract of a method (see "A method in a
+    package of your own"); its own options follow as keywords.
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter. `curve`: with degrees,
     the weight of each instant, a name or a function; see Shutter.
     `samples`: samples per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
@@ -65,6 +66,7 @@ class Blur:
     several threads must order the submissions themselves.
     """
 
+    @overload
     def __init__(
         self,
         method: MethodName = "gather",
@@ -77,14 +79,32 @@ class Blur:
         device: wgpu.GPUDevice | str | None = None,
         output: Literal["rgba32float", "rgba16float"] = "rgba32float",
         **options: Unpack[MethodKeywords],
+    ) -> None: ...
+
+    @overload
+    def __init__(self, method: type[Method], **arguments: Any) -> None: ...
+
+    def __init__(
+        self,
+        method: MethodName | type[Method] = "gather",
+        *,
+        shutter: Shutter | float = 180,
+        curve: Curve | Weight | None = None,
+        samples: int | Literal["auto"] | None = None,
+        jitter: float = 0.0,
+        max_blur: float | None = None,
+        device: wgpu.GPUDevice | str | None = None,
+        output: Literal["rgba32float", "rgba16float"] = "rgba32float",
+        **options: Any,
     ):
-        samples, self.auto = checked(method, samples, jitter, max_blur, output, options)
-        self._options = METHODS[method].Options(**options)
+        kind = method_of(method)
+        samples, self.auto = checked(kind, samples, jitter, max_blur, output, options)
+        self._options = kind.Options(**options)
         gpu.claim()
         self.device = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
-        if samples > (most := most_samples(method, self.device)):
-            raise InputError(f"{method} takes 1 to {most} samples without a GPU, got {samples}")
-        self.method = METHODS[method](self.device, self._options, output=output)
+        if samples > (most := most_samples(kind, self.device)):
+            raise InputError(f"{kind.name} takes 1 to {most} samples without a GPU, got {samples}")
+        self.method = kind(self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
         strata = AUTO_STRATA if self.auto else samples
@@ -120,7 +140,7 @@ class Blur:
     def _judge(self):
         """The same method, compiled to report its confidence."""
         options = replace(self._options, show="confidence")
-        return METHODS[self.method.name](self.device, options, output=self.output)
+        return type(self.method)(self.device, options, output=self.output)
 
     @property
     def extent(self) -> Extent:
@@ -350,7 +370,7 @@ class Blur:
     def _require(self, available: Collection[str], whose: str = "") -> None:
         if missing := self.method.needs - set(available):
             if "scene" in missing:
-                check_method(self.method.name, FRAME_METHODS)
+                check_takes_frames(type(self.method))
             what = " and ".join(whose + name for name in sorted(missing))
             how = ": to_next, or depth and a camera" if {"motion"} == missing else ""
             raise InputError(f"method {self.method.name!r} needs {what}{how}")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..camera import Reprojections, Window
 from ..frame import PASSES, Floats, Frame, Integers
 from ..methods import default_method
+from ..methods.contract import Method
 from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..shutter import Shutter, Weight
 from .blur import Blur
@@ -46,7 +47,7 @@ def blur(
     color: Floats,
     to_next: Floats | None = None,
     *,
-    method: MethodName | None = None,
+    method: MethodName | type[Method] | None = None,
     shutter: Shutter | float = 180,
     curve: Curve | Weight | None = None,
     samples: int | Literal["auto"] | None = None,
@@ -54,7 +55,7 @@ def blur(
 ) -> NDArray[np.float32]:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
-    `method`: a name in METHODS; by default gather if depth is available, else tap. `more`: the
+    `method`: as for Blur; by default gather if depth is available, else tap. `more`: the
     passes of Frame (to_prev, depth, camera, holdout, ...) and the options of Blur (jitter,
     max_blur, device, and those of the method).
     """

@@ -25,7 +25,7 @@ from ..io.frame_numbers import (
     numbered,
 )
 from ..io.suffixes import STILLS
-from ..methods import FRAME_METHODS, METHODS, check_method
+from ..methods import METHODS, check_method
 from ..output.names import check_suffix
 from ..output.output import Output
 from ..pipeline.blur import Blur
@@ -194,7 +194,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     settings make no sense together.
     """
     if request.blur.method is not None:
-        check_method(request.blur.method, FRAME_METHODS)
+        check_method(request.blur.method, of_frames=True)
     if request.shutter.seconds is None:  # says what is wrong with it
         request.shutter.make()
     check_suffix(request.output.output)

@@ -23,6 +23,7 @@ from ..io.suffixes import VIDEOS
 from ..sequence.findings import SequenceFindings, numbers, ranges
 from ..sequence.flow_motion import FAR
 from ..sequence.layers.masks import is_file, with_amount
+from ..settings import METHOD_OPTIONS
 from ..settings.typed import restored, typed
 from ..shots.cut_list import CutList
 from ..shutter import CURVES
@@ -148,8 +149,11 @@ def of_text(text: str, name: str) -> Stored:
 
 def _stored_of(content: dict[str, Any]) -> Stored:
     """The job from the tables of its file; the errors of Python where they are of other types."""
+    request = content["request"]
+    unset = {name: default for name, (_, default, _) in METHOD_OPTIONS.items()}
+    request["blur"] = unset | request["blur"]  # another package's method may be installed here only
     job = Job(
-        restored(BlurRequest, content["request"]),
+        restored(BlurRequest, request),
         dict(content["settings"]),
         numbers(content["numbers"]),
         findings_of(content["settled"]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 
 from ..errors import InputError
-from ..methods import FRAME_METHODS, METHODS
+from ..methods import METHODS, frame_methods
 from ..sequence.clip import Clip
 from ..sequence.frame_file import FrameFile
 from ..sequence.layers.names import layers
@@ -39,7 +39,7 @@ def _lacking(pattern: str, source: FrameFile, method: str, missing: frozenset[st
             f"'shot.####{source.path.suffix}', to find the motion in their pictures, or "
             "give a `camera` file for frames with depth"
         )
-    able = [name for name in FRAME_METHODS if METHODS[name].needs <= {"color", "motion"}]
+    able = [name for name in frame_methods() if METHODS[name].needs <= {"color", "motion"}]
     return InputError(
         f"{pattern} has no depth{there}; {method} needs it, {' and '.join(able)} do not"
     )

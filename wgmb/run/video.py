@@ -14,7 +14,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError, check_choice, did_you_mean_setting
 from ..extras import install_command, is_installed
-from ..methods import FRAME_METHODS, check_method
+from ..methods import check_method
 from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings
@@ -80,7 +80,7 @@ class VideoRequest(SettingsGroups):
     def open(self, device: wgpu.GPUDevice | str | None = None) -> VideoRun:
         """Open the GPU and what all videos share; InputError for settings that do not fit."""
         if self.blur.method is not None:
-            check_method(self.blur.method, FRAME_METHODS)
+            check_method(self.blur.method, of_frames=True)
         check_fits(self.input, self.blur)
         self.video.check()
         check_masks(self.blur.holdout)

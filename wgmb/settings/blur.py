@@ -8,10 +8,11 @@ import wgpu
 
 from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
-from ..pipeline.arguments import checked
+from ..pipeline.arguments import checked, method_of
 from ..pipeline.blur import Blur
 from ..scene.scene import Scene
 from ..shutter import Shutter
+from .record import plain
 
 
 def _method_options() -> dict[str, tuple[object, object, str]]:
@@ -42,7 +43,13 @@ _SHARED_HELP = {
 
 METHOD_OPTIONS = _method_options()
 """(type, default, help) of the options that only some methods have, by name."""
-
+_OF_OTHERS = METHOD_OPTIONS.keys() - {
+    option
+    for name, method in METHODS.items()
+    if name not in METHODS.packages
+    for option in options_of(method.Options)
+}
+"""Options that no method of wgmb has."""
 
 _Class = TypeVar("_Class", bound=type)
 
@@ -97,7 +104,7 @@ class BlurSettings:
     def make(self, shutter_: Shutter, device: wgpu.GPUDevice | str | None = None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""
         return Blur(
-            self.method or default_method({"motion", "depth"}),  # pyright: ignore[reportArgumentType]
+            method_of(self.method or default_method({"motion", "depth"})),
             shutter=shutter_,
             samples=self.samples,
             jitter=self.jitter,
@@ -111,12 +118,25 @@ class BlurSettings:
         own = {name: getattr(self, name) for name in METHOD_OPTIONS}
         return {k: v for k, v in own.items() if v is not None and v is not False}
 
+    @property
+    def looks(self) -> dict[str, Any]:
+        """The settings on which a result depends, for its record.
+
+        Options that only methods of other packages have are in it where they are set, so that it
+        does not depend on what is installed; with such a method, its package and version too.
+        """
+        unset = {name for name in _OF_OTHERS if getattr(self, name) == METHOD_OPTIONS[name][1]}
+        found = {name: value for name, value in plain(self).items() if name not in unset}
+        if package := METHODS.packages.get(self.method or ""):
+            found["package"] = package
+        return found
+
     def settled_samples(self) -> int | str:
         """The samples of the Blur, for a record: a number, or "auto".
 
         InputError as from `make`, but for what depends on the device; none is opened.
         """
-        method, options = self.method or "", self._method_options()
+        method, options = method_of(self.method or ""), self._method_options()
         samples, auto = checked(method, self.samples, self.jitter, self.max_blur, options=options)
-        METHODS[method].Options(**options)
+        method.Options(**options)
         return "auto" if auto else samples

@@ -57,7 +57,7 @@ def doctor() -> int:
 
     Example: wgmb doctor
     """
-    for line in (*_versions(), *_environment(), *_extras()):
+    for line in (*_versions(), *_environment(), *_extras(), *_methods()):
         out(line)
     lines, code = _blur()
     for line in (*_adapters(), *lines):
@@ -98,6 +98,17 @@ def _extras() -> Iterator[str]:
         for name in names:
             if why := faults.get(name):
                 yield f"  {EXTRAS[name].name} cannot be imported: {_without_home(why)}"
+
+
+def _methods() -> Iterator[str]:
+    """A line for each method that another package brings; main() tells which cannot be used."""
+    try:
+        from ...methods import METHODS
+    except Exception:  # of a library, which the blur tells
+        return
+    for name in METHODS:
+        if package := METHODS.packages.get(name):
+            yield f"method {name}: of {package}"
 
 
 def _version(package: str) -> str:
