@@ -1,5 +1,6 @@
 """Terminal output, exit codes with closed streams, and Ctrl-C while modules load."""
 
+import ast
 import os
 import signal
 import subprocess
@@ -12,6 +13,7 @@ from PIL import Image
 
 import make_frames as make
 import wgmb
+from wgmb.cli.console import Console
 from wgmb.cli.terminal import printable
 from wgmb.io import frame_numbers
 
@@ -48,6 +50,31 @@ def one_line(err: str) -> bool:
 def test_what_is_no_visible_character_is_escaped(text, shown):
     assert printable(text) == shown
     assert shown.isprintable()
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize("verbose", [False, True])
+def test_a_console_prints_what_was_asked_for_in_the_words_of_the_command_line(
+    capsys, quiet, verbose
+):
+    console = Console(quiet, verbose)
+    console.say("set `flow=search`", "", None, "said")
+    console.detail("detail of `max_mb`")
+    console.complain("lost by\n`resume=True`")
+    said = [] if quiet else ["set --flow search", "said"]
+    said += ["detail of --max-mb"] if verbose else []
+    assert capsys.readouterr().err.splitlines() == [*said, "wgmb: lost by --resume"]
+
+
+@pytest.mark.parametrize("name", [p.name for p in (ROOT / "wgmb/cli/commands").glob("*.py")])
+def test_a_command_prints_messages_through_its_console(name):
+    """There they are spelled as options, and --quiet and --verbose hold for them."""
+    tree = ast.parse((ROOT / "wgmb/cli/commands" / name).read_text())
+    taken = [one.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+             and (node.module or "") == "terminal" for one in node.names]  # fmt: skip
+    assert not {"note", "complain", "progress"} & set(taken)
+    names = [node.id for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    assert "print" not in names
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ import make_frames as make
 from wgmb import InputError, gpu
 from wgmb.cli import app
 from wgmb.cli.commands.blur_video import tell_how
+from wgmb.cli.console import Console
 from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.extras import install_command
 from wgmb.run import video_output
@@ -313,7 +314,7 @@ def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monk
         monkeypatch.setattr(f"{module}.is_installed", lambda package: False)
     for flow in ("auto", "search"):
         run = VideoRequest(video=VideoSettings(flow=flow)).open()
-        tell_how(run, quiet=False, verbose=False)
+        tell_how(run, Console())
         slow = run.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         said = install_command("flow") in capsys.readouterr().err
         assert said == (slow and flow == "auto")

@@ -285,6 +285,8 @@ def test_a_curve_that_changes_is_told(desk, capsys, shot):
         ("--job none.json", "none.json: no such file"),
         ("--job shot.json --frames 8-12", "9-12 are not in the job, which has 1-8"),
         ("--job shot.json --shutter 90", "--job holds all settings"),
+        ("--job shot.json --color-in bt709", "--job holds all settings"),
+        ("--job shot.json --try 0", "--job holds all settings"),
         ("--job shot.json -o x.####.exr", "--job holds all settings"),
         ("--job shot.json --frames 11 --resume", "--job holds all settings, and frames that are"),
         ("--job=shot.json --overwrite", "--job holds all settings"),

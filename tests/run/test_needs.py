@@ -3,7 +3,7 @@
 import pytest
 
 import make_frames as make
-from wgmb.cli.conclusion import cuts_told
+from wgmb.cli.console import cuts_told
 from wgmb.errors import counted
 from wgmb.io.frame_numbers import numbered
 

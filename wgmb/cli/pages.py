@@ -1,4 +1,4 @@
-"""Report pages and progress messages of `wgmb compare` and `wgmb bench`."""
+"""Report pages of `wgmb compare` and `wgmb bench`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import sys
 from pathlib import Path
 
 from ..errors import InputError
-from ..lab.cases import Tell
-from . import terminal
-from .terminal import note
 
 
 def whole_numbers(name: str, text: str) -> list[int]:
@@ -27,17 +24,6 @@ def pages_of(output: Path) -> list[Path]:
     if not output.parent.is_dir():
         raise InputError(f"no such folder: {output.parent}")
     return [output.with_suffix(suffix) for suffix in (".html", ".json", ".csv")]
-
-
-def teller(quiet: bool) -> Tell:
-    """Return a function that prints progress on stderr and checks for Ctrl-C."""
-
-    def tell(text: str) -> None:
-        terminal.check()
-        if not quiet:
-            note(text)
-
-    return tell
 
 
 def command_line() -> str:

@@ -8,15 +8,24 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Protocol
 
 from ..threads import Stop
+
+
+class Tick(Protocol):
+    """A function to call after every frame."""
+
+    def __call__(self, number: int, state: str, name: str = "frame") -> None:
+        """`state`: "done", "skipped" or "failed"; `name`: what stands before the number."""
+        ...
+
 
 interrupted = Stop()
 """Set by Ctrl-C: Python drops an exception that a signal raises within a destructor."""
 
 
-def interrupt(*_) -> None:
+def interrupt(*_: object) -> None:
     """The signals' handler."""
     interrupted.set()
     raise KeyboardInterrupt
@@ -31,8 +40,8 @@ def hush(unraisable: Any) -> None:
         sys.__unraisablehook__(unraisable)
 
 
-def check(*_) -> None:
-    """Raise an interruption that was dropped earlier."""
+def check(number: int = 0, state: str = "", name: str = "frame") -> None:
+    """Raise an interruption that was dropped earlier; a Tick."""
     if interrupted.is_set():
         raise KeyboardInterrupt
 
@@ -74,7 +83,7 @@ def flush() -> None:
 
 
 @contextlib.contextmanager
-def _taken():
+def _taken() -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -106,7 +115,7 @@ def own_streams() -> None:
 
 
 @contextlib.contextmanager
-def muted():
+def muted() -> Iterator[None]:
     """Keep other processes, which are started meanwhile, from writing between our lines.
 
     Our own streams are elsewhere; see `own_streams`.
@@ -144,11 +153,8 @@ def drop_streams() -> None:
 
 
 @contextlib.contextmanager
-def progress(frames: int, quiet: bool, doing: str = "blurring"):
-    """Yield a function to call after every frame; on a terminal it drives a progress bar.
-
-    It takes the frame's number, "done", "skipped" or "failed", and what stands before the number.
-    """
+def progress(frames: int, quiet: bool, doing: str = "blurring") -> Iterator[Tick]:
+    """Yield a function to call after every frame; on a terminal it drives a progress bar."""
     number = _number(sys.stderr)
     if quiet or number is None or not os.isatty(number):
         yield check
@@ -168,9 +174,9 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
         task = bar.add_task(doing, total=frames, speed="")
         started, made = time.perf_counter(), [0]
 
-        def tick(number: int, status: str, name: str = "frame") -> None:
+        def tick(number: int, state: str, name: str = "frame") -> None:
             check()
-            made[0] += status == "done"
+            made[0] += state == "done"
             speed = made[0] / (time.perf_counter() - started)
             bar.update(
                 task, advance=1, description=f"{name} {number}", speed=f"{speed:.1f} frames/s"
@@ -180,16 +186,16 @@ def progress(frames: int, quiet: bool, doing: str = "blurring"):
 
 
 @contextlib.contextmanager
-def share_of(tick: Callable[..., None], frames: int, name: str) -> Iterator[Callable[..., None]]:
+def share_of(tick: Tick, frames: int, name: str) -> Iterator[Callable[[int, str], None]]:
     """Yield a function to call after every frame of a share of a bar, under a name of its own.
 
     `tick`: what `progress` yielded. Frames of which it was not told count as skipped in the end.
     """
     count = itertools.count()
 
-    def tick_share(number: int, status: str) -> None:
+    def tick_share(number: int, state: str) -> None:
         next(count)
-        tick(number, status, name)
+        tick(number, state, name)
 
     try:
         yield tick_share

@@ -14,11 +14,11 @@ from ...lab.report import write
 from ...methods import METHODS
 from ...settings import size_of
 from .. import terminal
+from ..console import Console
 from ..options import Adapter, Quiet
 from ..pages import (
     command_line,
     pages_of,
-    teller,
     whole_numbers,
 )
 from ..terminal import out
@@ -102,7 +102,7 @@ def bench(
         raise InputError(f"no such folder: {save.parent}")
     counts = whole_numbers("samples", samples)
     before = Bench.load(against) if against else None
-    run = measure(device, candidates, sizes, counts, rounds, seconds, teller(quiet))
+    run = measure(device, candidates, sizes, counts, rounds, seconds, Console(quiet).say_running)
     if save:
         run.save(save)
     for line in bench_report.text(run).splitlines():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-import time
-from dataclasses import fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,15 +12,13 @@ from cyclopts import Parameter
 
 from ...errors import InputError
 from ...extras import needed_by
-from ...io.frame_numbers import frame_numbers
 from ...io.pipes import is_pipe
-from ...run.job import Job, settle
-from ...run.job_file import read_job
+from ...run.job import settle
 from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings, option_name
 from ...settings.groups import SettingsGroups
-from ..conclusion import conclude
+from ..console import Console
 from ..help import INPUT, RUN, VIDEO
 from ..names import is_batch
 from ..options import (
@@ -32,6 +30,7 @@ from ..options import (
     FrameBlurs,
     InputOptions,
     Inputs,
+    OutputOptions,
     Outputs,
     Quiet,
     ShutterOptions,
@@ -40,8 +39,7 @@ from ..options import (
     VideoOptions,
     Videos,
 )
-from ..spelling import as_options
-from ..terminal import check, muted, note, progress
+from .blur_frames import Crew, blur_frames, blur_job, blur_on_farm
 
 NOT_WITH_JOB = (
     "--job holds all settings, and frames that are done are kept; only --frames, --workers, "
@@ -122,80 +120,30 @@ def blur(
     quiet
         Print errors only.
     """
-    crew = _crew(workers, cluster)
-    if job is not None:
-        rest = replace(input, frames=None), blur, shutter, color, video
-        is_changed = output or trial or any(group != type(group)() for group in rest)
-        if patterns or confidence or fps_in or config or is_changed:
-            raise InputError(NOT_WITH_JOB)
-        return blur_job(job, input.frames, crew, adapter, verbose, quiet)
-    if not patterns:
-        raise InputError("no input: name frames such as 'shot.####.exr', or a video")
-    if output is None:
-        such = "out.mp4" if is_video(patterns[0]) else "'blurred.####.exr'"
-        raise InputError(f"--output is missing, such as -o {such}")
     groups = SettingsGroups(blur=blur, shutter=shutter, input=input, color=color, video=video)
-    pattern = patterns[0]
-    if is_pipe(pattern) or is_pipe(output.output):
-        with needed_by("a pipe", "video"):
-            from ...run.video import VideoRequest
-            from .blur_pipe import blur_pipe
-        if len(patterns) > 1 or confidence or crew or trial is not None:
-            raise InputError(
-                "a pipe stands alone: one input, and no --confidence, --try or --workers"
-            )
-        return blur_pipe(pattern, output, VideoRequest.of(groups), adapter, quiet, fps_in, color_in)
-    if color_in:
-        raise InputError("--color-in is for pipes; files state their colours, or are assumed to")
-    if is_batch(patterns, output.output) or is_video(pattern):
-        with needed_by(pattern, "video"):
-            from ...run.video import VideoRequest
-            from .blur_video import blur_video
-            from .blur_videos import blur_videos
-        if confidence or fps_in or crew:
-            option = "--fps-in" if fps_in else "--confidence"
-            if crew and not (confidence or fps_in):
-                option = "--workers" if workers else "--cluster"
-            raise InputError(f"{option} is for rendered frames")
-        _tell_unused(color, quiet)
-        how = VideoRequest.of(groups), adapter, quiet, verbose
-        if is_batch(patterns, output.output):
-            if trial is not None:
-                raise InputError("--try is for one video, and its output is a file")
-            return blur_videos(patterns, output, *how)
-        return blur_video(pattern, output, *how, trial)
-    if trial is not None:
-        raise InputError("--try is for videos; of frames, --frames selects some")
-    request = BlurRequest.of(
-        groups, pattern=pattern, output=output, confidence=confidence, fps_in=fps_in
+    call = BlurCall(
+        patterns,
+        output,
+        groups,
+        Console(quiet, verbose),
+        adapter,
+        job,
+        crew=_crew(workers, cluster),
+        fps_in=fps_in,
+        color_in=color_in,
+        trial=trial,
+        confidence=confidence,
+        config=config,
     )
-    made = settle(request, adapter)
-    if crew and made.request.conversion:
-        option = "--fps-in" if fps_in else "--flow none"
-        raise InputError(f"{option} cannot be combined with --workers or --cluster")
-    if crew:
-        return blur_on_farm(made, *crew, adapter, verbose, quiet)
-    return blur_frames(made, adapter, verbose, quiet)
-
-
-def _tell_unused(color: ColorSettings, quiet: bool) -> None:
-    """Say which colour options have no part in the blur of videos; InputError for a time."""
-    plain = ColorSettings()
-    if color.from_ and re.fullmatch(r"[\d:.]+", color.from_):
-        raise InputError(
-            f"--from is a colour space, got {color.from_}; a part of a video is --begin and --end"
-        )
-    used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
-    if used and not quiet:
-        options = ", ".join(map(option_name, used))
-        note(f"videos keep their own colours: {options} not used")
-
-
-Crew = tuple[int | None, str | None]
-"""Number of workers to start here, None for a suitable one; or the scheduler of other workers."""
+    road = next(road for road in ROADS if road.is_meant(call))
+    for option, why in road.refuses.items():
+        if option in call.options_used:
+            raise InputError(why)
+    return road.take(call)
 
 
 def _crew(workers: int | Literal["auto"] | None, cluster: str | None) -> Crew | None:
+    """The processes that share the frames; None for this one alone."""
     if workers is None and cluster is None:
         return None
     if workers is not None and cluster is not None:
@@ -203,67 +151,163 @@ def _crew(workers: int | Literal["auto"] | None, cluster: str | None) -> Crew | 
     count = None if workers == "auto" else workers
     if count is not None and not 1 <= count <= 256:
         raise InputError(f"--workers must be 1 to 256 or auto, got {count}")
-    return count, cluster
+    return Crew(count, cluster)
 
 
-def blur_job(
-    path: Path,
-    frames: str | None,
-    crew: Crew | None,
-    adapter: str | None,
-    verbose: bool,
-    quiet: bool,
-) -> int:
-    """Blur some frames of a job file, or all; returns the exit code."""
-    kept = read_job(path)
-    numbers = kept.job.chosen(frame_numbers(frames) if frames else kept.job.numbers)
-    kept.check(numbers, str(path))
-    if crew:
-        return blur_on_farm(replace(kept.job, numbers=numbers), *crew, adapter, verbose, quiet)
-    return blur_frames(kept.job, adapter, verbose, quiet, numbers)
+@dataclass(frozen=True)
+class BlurCall:
+    """`wgmb blur` as it was called; the last six are options that only some roads take."""
+
+    patterns: tuple[str, ...]
+    output: OutputOptions | None
+    groups: SettingsGroups
+    console: Console
+    adapter: str | None
+    job: Path | None
+    crew: Crew | None
+    fps_in: str | None
+    color_in: str | None
+    trial: int | None
+    confidence: bool
+    config: Path | None
+
+    @property
+    def options_used(self) -> set[str]:
+        """Names of the options in use that a road may refuse."""
+        is_used = {
+            "pattern": bool(self.patterns),
+            "--output": self.output is not None,
+            "--workers": self.crew is not None and self.crew.cluster is None,
+            "--cluster": self.crew is not None and self.crew.cluster is not None,
+            "--fps-in": bool(self.fps_in),
+            "--color-in": bool(self.color_in),
+            "--try": self.trial is not None,
+            "--confidence": self.confidence,
+            "--config": self.config is not None,
+        }
+        return {name for name, used in is_used.items() if used}
+
+    @property
+    def files(self) -> tuple[str, OutputOptions]:
+        """The first input and the output; InputError where one is missing."""
+        if not self.patterns:
+            raise InputError("no input: name frames such as 'shot.####.exr', or a video")
+        if self.output is None:
+            such = "out.mp4" if is_video(self.patterns[0]) else "'blurred.####.exr'"
+            raise InputError(f"--output is missing, such as -o {such}")
+        return self.patterns[0], self.output
 
 
-def blur_on_farm(
-    job: Job,
-    workers: int | None,
-    cluster: str | None,
-    adapter: str | None,
-    verbose: bool,
-    quiet: bool,
-) -> int:
-    """Blur frames of a job in several processes; returns the exit code."""
-    from ...run.farm.farm import Farm, as_farm_job
-
-    for text in () if quiet else job.remarks:
-        note(as_options(text))
-
-    def say(text: str) -> None:
-        note(as_options(text))
-
-    farm = Farm(cluster, workers, adapter, say, say if verbose else lambda text: None, check)
-    job = as_farm_job(job)
-    started = time.perf_counter()
-    with progress(len(job.numbers), quiet) as tick, muted():
-        report = farm.blur(job, tick)
-    took = f"{time.perf_counter() - started:.1f} s with {job.request.blur.method}"
-    return conclude(report, Path(job.request.output.output), took, quiet, verbose)
+def _is_piped(call: BlurCall) -> bool:
+    pattern, output = call.files
+    return is_pipe(pattern) or is_pipe(output.output)
 
 
-def blur_frames(
-    job: Job, adapter: str | None, verbose: bool, quiet: bool, numbers: list[int] | None = None
-) -> int:
-    """Blur frames of a job in this process, by default all; returns the exit code."""
-    for text in () if quiet else job.remarks:
-        note(as_options(text))
-    run = job.run(adapter, numbers)
-    if verbose:
-        note(f"adapter: {run.blur.device.adapter.summary}")
-        note(f"settings: {run.output.settings}")
-    started = time.perf_counter()
-    with progress(len(run.numbers), quiet) as tick:
-        report = run(tick)
-    if len(run.clip.numbers) < len(job.numbers):
-        report.unseen += report.absent  # other frames may have them
-        report.lacking = []
-    took = f"{time.perf_counter() - started:.1f} s with {run.blur.method.name}"
-    return conclude(report, run.output.pattern, took, quiet, verbose)
+def _is_of_videos(call: BlurCall) -> bool:
+    pattern, output = call.files
+    return is_batch(call.patterns, output.output) or is_video(pattern)
+
+
+def _take_job(call: BlurCall) -> int:
+    """A part of a job file, or all of it."""
+    groups = [getattr(call.groups, one.name) for one in fields(call.groups)]
+    frames = call.groups.input.frames
+    plain = [replace(one, frames=None) if one is call.groups.input else one for one in groups]
+    if any(group != type(group)() for group in plain) or call.job is None:
+        raise InputError(NOT_WITH_JOB)
+    return blur_job(call.job, frames, call.console, call.adapter, call.crew)
+
+
+def _take_pipe(call: BlurCall) -> int:
+    """Pictures from a pipe, or into one."""
+    pattern, output = call.files
+    if len(call.patterns) > 1:
+        raise InputError(_ALONE)
+    with needed_by("a pipe", "video"):
+        from ...run.video import VideoRequest
+        from .blur_pipe import blur_pipe
+    request = VideoRequest.of(call.groups)
+    return blur_pipe(
+        pattern, output, request, call.console, call.adapter, call.fps_in, call.color_in
+    )
+
+
+def _take_videos(call: BlurCall) -> int:
+    """One video, or several."""
+    pattern, output = call.files
+    with needed_by(pattern, "video"):
+        from ...run.video import VideoRequest
+        from .blur_video import blur_videos
+    _tell_unused(call.groups.color, call.console)
+    request = VideoRequest.of(call.groups)
+    return blur_videos(call.patterns, output, request, call.console, call.adapter, call.trial)
+
+
+def _take_frames(call: BlurCall) -> int:
+    """Rendered frames, in this process or in several."""
+    pattern, output = call.files
+    request = BlurRequest.of(
+        call.groups, pattern=pattern, output=output, confidence=call.confidence, fps_in=call.fps_in
+    )
+    job = settle(request, call.adapter)
+    if call.crew is None:
+        return blur_frames(job, call.console, call.adapter)
+    if job.request.conversion:
+        option = "--fps-in" if call.fps_in else "--flow none"
+        raise InputError(f"{option} cannot be combined with --workers or --cluster")
+    return blur_on_farm(job, call.crew, call.console, call.adapter)
+
+
+_ALONE = "a pipe stands alone: one input, and no --confidence, --try or --workers"
+_FOR_PIPES = "--color-in is for pipes; files state their colours, or are assumed to"
+_TRIED = "--try is for videos; of frames, --frames selects some"
+
+
+@dataclass(frozen=True)
+class Road:
+    """One way from input to output: calls that mean it, options that it refuses, with the error."""
+
+    is_meant: Callable[[BlurCall], bool]
+    take: Callable[[BlurCall], int]
+    refuses: Mapping[str, str]
+
+
+ROADS = (
+    Road(
+        lambda call: call.job is not None,
+        _take_job,
+        dict.fromkeys(
+            ("pattern", "--output", "--fps-in", "--color-in", "--try", "--confidence", "--config"),
+            NOT_WITH_JOB,
+        ),
+    ),
+    Road(
+        _is_piped,
+        _take_pipe,
+        dict.fromkeys(("--confidence", "--try", "--workers", "--cluster"), _ALONE),
+    ),
+    Road(
+        _is_of_videos,
+        _take_videos,
+        {"--color-in": _FOR_PIPES}
+        | {
+            option: f"{option} is for rendered frames"
+            for option in ("--fps-in", "--confidence", "--workers", "--cluster")
+        },
+    ),
+    Road(lambda call: True, _take_frames, {"--color-in": _FOR_PIPES, "--try": _TRIED}),
+)
+"""The roads, of which the first that a call means is taken."""
+
+
+def _tell_unused(color: ColorSettings, console: Console) -> None:
+    """Say which colour options have no part in the blur of videos; InputError for a time."""
+    plain = ColorSettings()
+    if color.from_ and re.fullmatch(r"[\d:.]+", color.from_):
+        raise InputError(
+            f"--from is a colour space, got {color.from_}; a part of a video is --begin and --end"
+        )
+    used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
+    if used:
+        options = ", ".join(map(option_name, used))
+        console.say(f"videos keep their own colours: {options} not used")

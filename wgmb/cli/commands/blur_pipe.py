@@ -13,49 +13,36 @@ from ...io.pipes import STDIN, STDOUT
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
-from ..conclusion import cuts_told
+from ..console import Console, cuts_told
 from ..exit_codes import DONE, SOME_FAILED
-from ..spelling import as_options
-from ..terminal import check, note
+from ..terminal import check
 
 
 def blur_pipe(
     source: str,
     output: OutputSettings,
     request: VideoRequest,
-    adapter: str | None,
-    quiet: bool,
-    fps_in: str | None,
-    color_in: str | None,
+    console: Console,
+    adapter: str | None = None,
+    fps_in: str | None = None,
+    color_in: str | None = None,
 ) -> int:
     """Blur from or into a pipe; returns the exit code."""
-
     if source == STDIN and os.isatty(0):
         raise InputError("standard input is a terminal; pipe pictures into it, such as: "
                          "ffmpeg -i in.mp4 -f yuv4mpegpipe - |")  # fmt: skip
 
-    def tell(text: str) -> None:
-        if not quiet:
-            note(as_options(text))
-
-    def progress(number: int, state: str) -> None:
-        check(number, state)
-
     with _stdout(output.output) as stdout:
         report = run(
             source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
-            color_in=color_in, tell=tell, progress=progress,
+            color_in=color_in, tell=console.say, progress=check,
         )  # fmt: skip
-    for text in report.left_out:
-        tell(text)
-    if report.cuts:
-        tell(cuts_told(report.cuts, "picture"))
-    if report.held_out:
-        tell(report.held_out)
+    cuts = cuts_told(report.cuts, "picture") if report.cuts else ""
+    console.say(*report.left_out, cuts, report.held_out)
     where = "stdout" if output.output == STDOUT else output.output
-    tell(f"{counted(report.frames, 'frame')} -> {where}")
+    console.say(f"{counted(report.frames, 'frame')} -> {where}")
     if report.loss:
-        note(f"wgmb: {report.loss}")
+        console.complain(report.loss)
         return SOME_FAILED
     return DONE
 

@@ -1,87 +1,179 @@
-"""`wgmb blur` of a video: into a video, or into frames."""
+"""`wgmb blur` of videos: one or several, into videos or into frames.
+
+One video has several lines of messages, and its error ends the command. Of several, which share a
+progress bar, each has one line, and one that fails is reported.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
-from ...errors import counted
+from ...errors import GpuMemoryError, InputError, counted
+from ...io import stills
+from ...io.frame_numbers import is_pattern
+from ...run.report import Progress, VideoReport
 from ...run.trial.trial import Trial
 from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
-from ..conclusion import cuts_told, repeats_told
+from ...settings.video import VideoSettings
+from ...video.write.encoders import SUFFIXES, chosen
+from ..console import Console, cuts_told, repeats_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
-from ..spelling import as_options
-from ..terminal import note, progress
+from ..names import is_batch, outputs_of, videos_of
+from ..terminal import Tick, share_of
+
+_FAILURES = InputError, GpuMemoryError, OSError, MemoryError
+"""Errors of one video, after which others may be done."""
 
 
-def blur_video(
-    path: str,
+def blur_videos(
+    patterns: Sequence[str],
     output: OutputSettings,
     request: VideoRequest,
-    adapter: str | None,
-    quiet: bool,
-    verbose: bool,
+    console: Console,
+    adapter: str | None = None,
     trial: int | None = None,
 ) -> int:
-    """Blur a video, or try its settings at some places; returns the exit code."""
-    run = request.open(adapter)
-    plan = run.plan(path, output)
-    tell_how(run, quiet, verbose)
-    for text in () if quiet else plan.notes:
-        note(as_options(f"{path}: {text}"))
+    """Blur one video or several, or try the settings at some places of one; the exit code."""
+    if not is_batch(patterns, output.output):
+        run = request.open(adapter)
+        plan = run.plan(patterns[0], output)
+        tell_how(run, console)
+        console.say(*(f"{patterns[0]}: {text}" for text in plan.notes))
+        if trial is not None:
+            return _try_out(run, plan, trial, console)
+        return _blur_alone(run, plan, console)
     if trial is not None:
-        return _try_out(run, plan, trial, quiet)
-    with progress(len(plan.wanted), quiet) as tell:
-        report = run(plan, tell if quiet else estimated(tell, len(plan.wanted), run))
-    for text in () if quiet else report.left_out:
-        note(f"{plan.name}: {text}")
-    if not quiet and report.is_new:
-        took = f"{report.seconds:.1f} s"
-        if report.method:
-            took += f" with {report.method}"
-        if report.cuts:
-            note(cuts_told(report.cuts, "picture"))
-        if report.flashes:
-            note(f"flash at picture {', '.join(map(str, report.flashes))}")
-        if run.request.video.duplicates == "fill":
-            note(repeats_told(report.repeated))
-        if report.held_out:
-            note(as_options(report.held_out))
-        if report.scaling:
-            note(report.scaling)
-        note(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
+        raise InputError("--try is for one video, and its output is a file")
+    paths = videos_of(patterns)
+    outputs = [replace(output, output=name) for name in outputs_of(paths, output.output)]
+    for one in outputs:
+        _check_output(one, request.video)
+    run = request.open(adapter)
+    tell_how(run, console)
+    return _blur_each(run, paths, outputs, console)
+
+
+def tell_how(run: VideoRun, console: Console) -> None:
+    """Say where motion comes from, and, if asked, the settings."""
+    console.detail(f"adapter: {run.blur.device.adapter.summary}")
+    console.detail(f"settings: {json.dumps(run.settings, sort_keys=True)}")
+    console.say(f"motion: {run.how}", run.advice)
+
+
+# ---- one video -------------------------------------------------------------------------------
+
+
+def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
+    """Blur a video, with lines about what was seen in it; the exit code."""
+    with console.progress(len(plan.wanted)) as tick:
+        report = run(plan, _estimated(tick, len(plan.wanted), run, console))
+    console.say(*(f"{plan.name}: {text}" for text in report.left_out))
+    if report.is_new:
+        cuts, flashes = report.cuts, ", ".join(map(str, report.flashes))
+        console.say(
+            cuts_told(cuts, "picture") if cuts else "",
+            f"flash at picture {flashes}" if flashes else "",
+            *_remarks(report, run),
+        )
+        took = f"{report.seconds:.1f} s" + (f" with {report.method}" if report.method else "")
+        console.say(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
     if report.loss:
-        note(f"wgmb: {report.loss}")
+        console.complain(report.loss)
         return SOME_FAILED
     return DONE
 
 
-def estimated(tell: Callable[..., None], frames: int, run: VideoRun) -> Callable[..., None]:
+def _estimated(tick: Tick, frames: int, run: VideoRun, console: Console) -> Progress:
     """A progress that also says how long a long run takes, and what is quicker."""
     words = f"{run.quicker}, and --try 5 shows some places first"
-    return Estimate(tell, frames, as_options(words), note)
+    return Estimate(tick, frames, words, console.say)
 
 
-def _try_out(run: VideoRun, plan: VideoPlan, places: int, quiet: bool) -> int:
-    """Blur some places of a video, beside the original; returns the exit code."""
+def _try_out(run: VideoRun, plan: VideoPlan, places: int, console: Console) -> int:
+    """Blur some places of a video, beside the original; the exit code."""
     trial, begun = Trial(run, plan, places), time.perf_counter()
-    with progress(trial.total, quiet) as tell:
-        trial(tell)
-    if not quiet:
-        took = f"{time.perf_counter() - begun:.1f} s"
-        note(f"the original and the result side by side in {took} -> {plan.name}")
+    with console.progress(trial.total) as tick:
+        trial(tick)
+    took = f"{time.perf_counter() - begun:.1f} s"
+    console.say(f"the original and the result side by side in {took} -> {plan.name}")
     return DONE
 
 
-def tell_how(run: VideoRun, quiet: bool, verbose: bool) -> None:
-    """Say where motion comes from, and, if asked, the settings."""
-    if verbose:
-        note(f"adapter: {run.blur.device.adapter.summary}")
-        note(f"settings: {json.dumps(run.settings, sort_keys=True)}")
-    if not quiet:
-        note(f"motion: {run.how}")
-        if run.advice:
-            note(run.advice)
+# ---- several videos --------------------------------------------------------------------------
+
+
+def _blur_each(
+    run: VideoRun, paths: Sequence[Path], outputs: Sequence[OutputSettings], console: Console
+) -> int:
+    """Blur videos one after the other; the exit code."""
+    plans: list[VideoPlan | str] = []
+    for path, output in zip(paths, outputs, strict=True):
+        try:
+            plans.append(run.plan(path, output))
+        except _FAILURES as error:
+            plans.append(_reason(error, path))
+    total = sum(len(plan.wanted) for plan in plans if isinstance(plan, VideoPlan))
+    failed = 0
+    with console.progress(total) as tick:
+        for plan in plans:
+            if isinstance(plan, str):
+                console.complain(plan)
+                failed += 1
+            else:
+                failed += not _one_of_many(run, plan, tick, console)
+    console.say(f"{len(plans) - failed} of {counted(len(plans), 'video')} done")
+    return SOME_FAILED if failed else DONE
+
+
+def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -> bool:
+    """Blur a video and say so in a line; returns whether all of it is done."""
+    path = plan.reader.path
+    try:
+        with share_of(tick, len(plan.wanted), f"{path.name}, frame") as tick_share:
+            report = run(plan, tick_share)
+    except _FAILURES as error:
+        console.complain(_reason(error, path))
+        return False
+    took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
+    words = [took if report.is_new else "", *report.left_out, *report.notes]
+    words += _remarks(report, run)
+    console.say(f"{path}: {'; '.join(filter(None, words))} -> {report.output}")
+    if report.loss:
+        console.complain(report.loss)
+        return False
+    return True
+
+
+def _remarks(report: VideoReport, run: VideoRun) -> list[str]:
+    """Lines on what was seen in a video; some are empty."""
+    fills = report.is_new and run.request.video.duplicates == "fill"
+    return [repeats_told(report.repeated) if fills else "", report.held_out, report.scaling]
+
+
+def _reason(error: BaseException, path: Path) -> str:
+    """The error in one line that names the video."""
+    text = getattr(error, "strerror", None) or str(error) or "not enough memory"
+    return text if str(path) in text else f"{path}: {text}"
+
+
+def _check_output(output: OutputSettings, video: VideoSettings) -> None:
+    """InputError for a video that cannot be written, or is there and is not to be replaced."""
+    path = Path(output.output)
+    suffix = path.suffix.lower()
+    if suffix in (".exr", *stills.SUFFIXES) and is_pattern(path):
+        return  # how many frames there are depends on the video
+    if suffix not in SUFFIXES:
+        raise InputError(
+            f"output {path}: must be a video {' '.join(SUFFIXES)}, a frame pattern, or a folder, "
+            "whose name ends in /"
+        )
+    chosen(path, video.codec, video.quality, video.encoder)
+    if os.path.exists(os.path.realpath(path)) and not (output.overwrite or output.resume):
+        raise InputError(f"{path} exists; --overwrite replaces it, --resume keeps finished videos")

@@ -29,12 +29,12 @@ from ...metrics import check_flip
 from ...scene.scene import Scene
 from ...settings import ShutterSettings, size_of
 from ...shutter import Shutter
+from ..console import Console
 from ..help import MAIN
 from ..options import Adapter, InputOptions, Inputs, Quiet, ShutterOptions, Shutters
 from ..pages import (
     command_line,
     pages_of,
-    teller,
     whole_numbers,
 )
 
@@ -150,7 +150,7 @@ def compare(
         raise InputError("pass either scenes, --truth with --inputs, or --experiment")
     check_flip()  # before a reference is rendered for minutes
     device = gpu.open_device(adapter)
-    tell = teller(quiet)
+    tell = Console(quiet).say_running
     lab = Laboratory(device, rounds=comparison.rounds, tell=tell)
     report = Report("", command_line(), machine(device), comparison.samples)
     wanted, candidates = size_of(size), comparison.candidates()

@@ -23,10 +23,11 @@ from ...sequence.frame_file import FrameFile, is_video
 from ...sequence.input_color import space_of
 from ...sequence.layers import names
 from ...settings.color import ColorSettings
+from ..console import Console
 from ..exit_codes import DONE
 from ..options import Colors, InputOptions, Inputs
 from ..spelling import as_options
-from ..terminal import note, out
+from ..terminal import out
 
 _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
 
@@ -69,8 +70,7 @@ def info(
     if scan:
         raise InputError("`scan` is for videos")
     clip = input.open(pattern, space=color.space(shown))
-    if color.remark:
-        note(color.remark)
+    Console().say(color.remark)
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
     lines = describe(clip, output, shown)

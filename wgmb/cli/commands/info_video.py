@@ -5,8 +5,9 @@ from __future__ import annotations
 from ...color.coding import Coding
 from ...video.read.reader import VideoReader
 from ...video.scan import scan_video
+from ..console import Console
 from ..exit_codes import DONE, SOME_FAILED
-from ..terminal import note, out, progress
+from ..terminal import out
 
 _KINDS = {"yuv": "Y'CbCr", "rgb": "RGB", "grey": "grey"}
 _STEPS = {(2, 2): " 4:2:0", (2, 1): " 4:2:2", (1, 1): " 4:4:4"}
@@ -39,13 +40,14 @@ def tell_about(path: str, max_mb: float, scan: bool) -> int:
     if not scan:
         _print([("cuts", "not looked for; --scan decodes the video and lists them")])
         return DONE
-    with progress(len(reader), quiet=False, doing="reading") as tell:
-        found = scan_video(reader, tell)
+    console = Console()
+    with console.progress(len(reader), "reading") as tick:
+        found = scan_video(reader, tick)
     _print(found)
     if scaling := reader.scaling():
         _print([("scaled", scaling)])
     if loss := reader.loss():
-        note(f"wgmb: {loss}")
+        console.complain(loss)
         return SOME_FAILED
     return DONE
 

@@ -18,6 +18,7 @@ from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings
 from .. import submit
+from ..console import Console
 from ..exit_codes import DONE
 from ..options import (
     Adapter,
@@ -35,9 +36,7 @@ from ..options import (
     VideoOptions,
     Videos,
 )
-from ..spelling import as_options
 from ..submit import is_ours
-from ..terminal import note
 
 
 def job(
@@ -125,13 +124,10 @@ def job(
     texts[file] = kept.text()
     for path, text in texts.items():
         write_file(path, text.encode())
-    for text in () if quiet else made.remarks:
-        note(as_options(text))
-    if not quiet:
-        if made.clip.is_finding_notable:
-            note(f"vectors: {as_options(made.clip.finding)}")
-        frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
-        note(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
+    console, finding = Console(quiet), made.findings.finding
+    console.say(*made.remarks, f"vectors: {finding.text}" if finding.notable else "")
+    frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
+    console.say(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE
 
 

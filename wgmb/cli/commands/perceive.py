@@ -20,10 +20,11 @@ from ...scene import builtin
 from ...sequence.frame_file import is_video
 from ...settings import OutputSettings
 from ...settings.perception import PerceptionSettings
+from ..console import Console, done_line
 from ..exit_codes import DONE, SOME_FAILED
 from ..help import MAIN
 from ..options import Adapter, InputOptions, Inputs, PerceivedOutputs, Quiet
-from ..terminal import note, out, progress
+from ..terminal import out
 
 if TYPE_CHECKING:
     from ...run.perceive_video import PerceivedVideo
@@ -67,10 +68,11 @@ def perceive(
     quiet
         Print errors only.
     """
+    console = Console(quiet)
     if report:
         if pattern is not None:
             raise InputError(f"--report takes no input, got {pattern!r}")
-        return _report(output, perception, speed, quiet)
+        return _report(output, perception, speed, console)
     if pattern is None:
         raise InputError("perceive needs frames, a video, a scene, or --report")
     if speed is not None:
@@ -82,37 +84,33 @@ def perceive(
     if pattern not in builtin.SCENES and is_video(pattern):
         with needed_by(pattern, "video"):
             from ...run.perceive_video import perceive_video
-        return _write_video(
-            perceive_video(pattern, output, input, perception, adapter), pattern, quiet
-        )
+        video = perceive_video(pattern, output, input, perception, adapter)
+        return _write_video(video, pattern, console)
     run = perceive_frames(pattern, output, input, perception, adapter)
     started = time.perf_counter()
-    with progress(len(run.frames.numbers), quiet, "perceiving") as tick:
+    with console.progress(len(run.frames.numbers), "perceiving") as tick:
         made = run(tick)
-    if not quiet:
-        seconds = time.perf_counter() - started
-        note(f"{counted(len(made.done), 'frame')} in {seconds:.1f} s -> {run.output.pattern}")
+    took = f"{time.perf_counter() - started:.1f} s"
+    console.say(done_line(made, took, run.output.pattern))
     return DONE
 
 
-def _write_video(video: PerceivedVideo, path: str, quiet: bool) -> int:
+def _write_video(video: PerceivedVideo, path: str, console: Console) -> int:
     """Write a perceived video, and say so."""
-    for text in () if quiet else video.reader.notes:
-        note(f"{path}: {text}")
-    with progress(len(video.wanted), quiet, "perceiving") as tick:
+    console.say(*(f"{path}: {text}" for text in video.reader.notes))
+    with console.progress(len(video.wanted), "perceiving") as tick:
         report = video(tick)
-    if not quiet:
-        for text in report.left_out:
-            note(f"{report.output}: {text}")
-        note(f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s -> {report.output}")
+    console.say(*(f"{report.output}: {text}" for text in report.left_out))
+    took = f"{report.seconds:.1f} s"
+    console.say(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
     if report.loss:
-        note(f"wgmb: {report.loss}")
+        console.complain(report.loss)
         return SOME_FAILED
     return DONE
 
 
 def _report(
-    output: OutputSettings, perception: PerceptionSettings, speed: float | None, quiet: bool
+    output: OutputSettings, perception: PerceptionSettings, speed: float | None, console: Console
 ) -> int:
     fps, path = float(output.rate), Path(output.output)
     if path.suffix.lower() != ".svg":
@@ -123,7 +121,7 @@ def _report(
     speeds = np.linspace(fps / 12, fps * 5 / 3, 20)
     found = compare(fps, speeds, perception.cone)
     write_file(path, charts.svg(*perception_charts(found, speeds, fps)).encode())
-    if not quiet:
+    if not console.quiet:
         out("rad/s    " + "".join(f"{name:>11}" for name in found))
         for i in range(3, len(speeds), 4):
             row = "".join(f"{values[i]:11.4f}" for values in found.values())

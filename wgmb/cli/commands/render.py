@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from ...errors import counted
 from ...run.scene import SceneRequest
 from ...settings.color import DisplaySettings
+from ..console import Console, done_line
 from ..exit_codes import DONE
 from ..options import (
     Adapter,
@@ -24,7 +24,6 @@ from ..options import (
     Shutters,
     Verbose,
 )
-from ..terminal import note, progress
 
 
 def render(
@@ -76,16 +75,13 @@ def render(
         confidence=confidence,
     )
     run = request.open(adapter)
-    if color.remark and not (quiet or output.is_exr):
-        note(color.remark)
-    if verbose:
-        note(f"adapter: {run.render.blur.device.adapter.summary}")
-        note(f"settings: {run.output.settings}")
+    console = Console(quiet, verbose)
+    console.say("" if output.is_exr else color.remark)
+    console.detail(f"adapter: {run.render.blur.device.adapter.summary}")
+    console.detail(f"settings: {run.output.settings}")
     started = time.perf_counter()
-    with progress(run.frames.total, quiet, "rendering") as tick:
+    with console.progress(run.frames.total, "rendering") as tick:
         report = run(tick)
-    if not quiet:
-        seconds, skipped = time.perf_counter() - started, len(report.skipped)
-        done = f"{counted(len(report.done), 'frame')} in {seconds:.1f} s -> {run.output.pattern}"
-        note(done + (f", {skipped} already done" if skipped else ""))
+    took = f"{time.perf_counter() - started:.1f} s"
+    console.say(done_line(report, took, run.output.pattern))
     return DONE

@@ -11,9 +11,8 @@ from ...errors import InputError, counted
 from ...io.data_files import FLO
 from ...output.vectors import PROGRAMS
 from ...run.vectors import VectorsRequest
-from ..conclusion import conclude
+from ..console import Console
 from ..options import Adapter, InputOptions, Inputs, Quiet, Verbose
-from ..terminal import note, progress
 
 
 def vectors(
@@ -73,15 +72,14 @@ def vectors(
     )
     run = request.open(adapter)
     clip, files = run.clip, run.output
-    if verbose:
-        note(f"settings: {files.settings}")
+    console = Console(quiet, verbose)
+    console.detail(f"settings: {files.settings}")
     started = time.perf_counter()
-    with progress(len(clip.numbers), quiet, "writing vectors") as tick:
+    with console.progress(len(clip.numbers), "writing vectors") as tick:
         report = run(tick)
-    if not quiet:
-        for number, count in sorted(files.clipped.items()):
-            note(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
-        if len(clip.chosen) > 1 and not files.takes_views:
-            note(f"wrote only view {clip.chosen[0]}; %V in the output's name makes a file for each")
-    took = f"{time.perf_counter() - started:.1f} s"
-    return conclude(report, files.pattern, took, quiet, verbose)
+    for number, count in sorted(files.clipped.items()):
+        console.say(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
+    if len(clip.chosen) > 1 and not files.takes_views:
+        view = clip.chosen[0]
+        console.say(f"wrote only view {view}; %V in the output's name makes a file for each")
+    return console.conclude(report, files.pattern, f"{time.perf_counter() - started:.1f} s")

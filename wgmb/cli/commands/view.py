@@ -9,6 +9,7 @@ from ...errors import DeviceError
 from ...extras import needed_by
 from ...settings import size_of
 from ...settings.color import ColorSettings
+from ..console import Console
 from ..exit_codes import DONE
 from ..options import (
     Adapter,
@@ -23,7 +24,6 @@ from ..options import (
     VideoOptions,
     Videos,
 )
-from ..terminal import note
 
 
 def view(
@@ -86,7 +86,6 @@ def view(
     if fps is not None:
         state = viewer.at_rate(state, fps)
     state = replace(state, shutter=state.shutter.resolved(fps=state.fps))
-    if color.remark:
-        note(color.remark)
+    Console().say(color.remark)
     viewer.view(state, adapter=adapter, size=size_of(window), interface=interface)
     return DONE
