@@ -60,8 +60,8 @@ HOMES = {
 }
 LOCKS = {  # modules that take locks, beside `threads`, where threads start
     "gpu/priority", "hosts/explorer", "hosts/vapoursynth", "io/exr_library", "observer",
-    "pipeline/blur", "render", "run/conversion", "viewer/draw/draw_thread", "viewer/draw/screen",
-    "viewer/subjects/motion_thread", "video/read/stream_text"}  # fmt: skip
+    "pipeline/blur", "render", "run/conversion", "run/picture_stages", "viewer/draw/draw_thread",
+    "viewer/draw/screen", "viewer/subjects/motion_thread", "video/read/stream_text"}  # fmt: skip
 FILES = sorted(PACKAGE.rglob("*.py"))
 KERNELS = sorted(SHADERS.rglob("*.wgsl"))
 TOOLS = sorted((ROOT / "tools").rglob("*.py"))

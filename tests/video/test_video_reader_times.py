@@ -78,6 +78,16 @@ def test_a_rate_that_is_rounded_to_milliseconds_is_known_again(tmp_path, rate, w
     assert not reader.is_variable
 
 
+def test_times_that_keep_no_rate_are_exact_as_they_are(tmp_path):
+    times = [Fraction(n + (n > 5), 24) for n in range(12)]  # a pause
+    frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(12)]
+    reader = VideoReader(clips.write(tmp_path / "c.mkv", frames, times))
+    assert float(reader.exact_times[7]) == pytest.approx(8 / 24)
+    times[6] -= Fraction(1, 96)
+    reader = VideoReader(clips.write(tmp_path / "d.mkv", frames, times))
+    assert list(reader.exact_times) == list(reader.times)
+
+
 @pytest.mark.parametrize("rate", ["30", "30000/1001", "60000/1001", "120000/1001"])
 @pytest.mark.parametrize("count", [3, 8, 44])
 def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path, rate, count):
@@ -88,6 +98,7 @@ def test_a_few_times_of_milliseconds_have_the_rate_that_the_file_states(tmp_path
         assert container.streams.video[0].time_base == Fraction(1, 1000)
     reader = VideoReader(path)
     assert reader.rate == Fraction(rate) and not reader.is_variable
+    assert list(reader.exact_times) == [n / Fraction(rate) for n in range(count)]
 
 
 def test_a_rate_that_the_times_do_not_keep_is_not_believed(tmp_path):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import gpu
 from ..color.spaces import ColorSpace, Display
@@ -36,16 +36,18 @@ from ..sequence.input_color import space_of
 from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
 from ..settings.record import record
-from ..settings.video import VideoSettings
+from ..settings.video import VideoSettings, by_place
 from ..shots.cut_list import CutList
 from ..threads import Stop
 from .conversion import RateConversion, RateConversionStages
 from .engine import RunOptions
-from .needs import check_needs
 from .report import BatchReport, Progress
-from .request import BlurRequest
+from .request import BlurRequest, check_needs
 from .sequence import blur_into
 from .stages import Stages
+
+if TYPE_CHECKING:
+    from .picture_stages import PictureRoad
 
 _OWN = 0.5  # frame intervals around a frame that it stands for
 
@@ -121,13 +123,30 @@ class Job:
         clip, _ = self._opened
         if numbers is not None:
             clip = clip.part(self.chosen(numbers))
-        if self.flow:
-            clip.move_by(self.request.video.source(blur.device)[0])
+        road = self._road(clip, blur) if self.flow else None
         if expansion := self.request.video.expansion:
             clip.expand_highlights(expansion.white)
         files = self.make_output(None if numbers is None else clip)
         request = self.request
-        return Run(clip, blur, files, self._resumes, request.confidence, request.conversion)
+        how = request.confidence, request.conversion, road
+        return Run(clip, blur, files, self._resumes, *how)
+
+    def _road(self, clip: Clip, blur: Blur) -> PictureRoad | None:
+        """The choices for frames without vectors; None where each is blurred by itself."""
+        from .picture_stages import PictureRoad, are_pictures  # only where it is needed
+
+        request = self.request
+        motion = by_place() if request.is_by_place else request.video.source(blur.device)[0]
+        clip.move_by(motion)
+        if motion is None or request.confidence or request.blur.scale or not are_pictures(clip):
+            return None
+        at_edges = None
+        if request.has_edges_gathered:
+            at_edges = request.blur.at_edges(blur.shutter, blur.device)
+        is_still = Path(request.output.output).suffix.lower() in STILLS and not self.is_shown
+        bits = request.output.bits if is_still else 0
+        cuts = CutList(request.input.cuts or "").is_search
+        return PictureRoad(motion, at_edges, not request.blur.holdout, cuts, bits)
 
     @property
     def _resumes(self) -> bool:
@@ -169,6 +188,8 @@ class Run:
     resume: bool
     confidence: bool
     conversion: RateConversion | None = None
+    road: PictureRoad | None = None
+    """Of frames without vectors, which are blurred as the pictures of a video."""
 
     @property
     def numbers(self) -> list[int]:
@@ -178,10 +199,17 @@ class Run:
     def __call__(self, progress: Progress | None = None, stop: Stop | None = None) -> BatchReport:
         """Blur every frame; see blur_sequence."""
         options = RunOptions(self.resume, progress, stop, on_error="go on")
-        return blur_into(self.output, self._stages(), options)
+        stages = self._stages()
+        report = blur_into(self.output, stages, options)
+        report.notes |= {text: list(report.done) for text in stages.messages}
+        return report
 
     def _stages(self) -> Stages:
         all_views = self.output.takes_views
+        if self.road is not None:
+            from .picture_stages import PictureStages
+
+            return PictureStages(self.clip, self.blur, self.road, self.conversion, all_views)
         if self.conversion is not None:
             return RateConversionStages(self.clip, self.blur, self.conversion, all_views)
         return Stages(self.clip, self.blur, self.confidence, all_views)
@@ -215,6 +243,9 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
         remarks.append(_of_conversion(conversion, clip, request.output))
         request = replace(request, output=replace(request.output, layers="picture"))
     video, how = _motion(findings, request, adapter)
+    is_by_place = bool(how) and request.video.flow == "auto" and video.flow == "dis"
+    has_edges = is_by_place and request.blur.method is None
+    request = replace(request, is_by_place=is_by_place, has_edges_gathered=has_edges)
     if how:
         blur = replace(request.blur, method=request.blur.method or video.method).for_pictures()
     else:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 from ..color.spaces import Display
 from ..errors import InputError
+from ..methods import METHODS, frame_methods
 from ..sequence.clip import Clip
 from ..sequence.findings import SequenceFindings
+from ..sequence.frame_file import FrameFile
+from ..sequence.layers.names import layers
 from ..settings import OutputSettings, rate_of
 from ..settings.color import color_record
 from ..settings.groups import SettingsGroups
@@ -24,6 +28,10 @@ class BlurRequest(SettingsGroups):
     fps_in: str | None = None
     averages: bool = False
     """The frames have no motion, and `flow` is "none"; found out by `settle`."""
+    is_by_place: bool = False
+    """Their motion is found by dense inverse search, better by place; found out by `settle`."""
+    has_edges_gathered: bool = False
+    """Frames with edges of motion are blurred by gather there; found out by `settle`."""
 
     @property
     def conversion(self) -> RateConversion | None:
@@ -56,9 +64,44 @@ class BlurRequest(SettingsGroups):
         input = replace(self.input, frames=None, skip_missing=True) if settled else self.input
         space = self.color.space(shown)
         holdout, scale = self.blur.holdout, self.blur.scale
+        holdout = () if holdout == ("none",) else holdout
         return input.open(self.pattern, holdout, scale, space, settled), shown
 
     def color_record(self, display: Display | None) -> dict[str, str | None]:
         """Colour settings that change the contents of the files."""
         space = self.color.space(display)
         return color_record(display, self.output.output, space, self.pattern)
+
+
+def check_needs(clip: Clip, method: str) -> None:
+    """InputError where the first, the middle and the last frame lack what the method needs.
+
+    A frame that alone lacks it, or cannot be read, fails in its turn.
+    """
+    numbers = clip.numbers
+    errors: list[InputError] = []
+    for number in dict.fromkeys(numbers[i] for i in (0, len(numbers) // 2, -1)):
+        with contextlib.suppress(InputError, OSError):
+            source = clip.source(number)
+            has = {"color", *clip.frame(source, picture=False, normal=False, light=False).has}
+            missing = METHODS[method].needs - has
+            if not missing:
+                return
+            errors.append(_lacking(str(clip.pattern), source, method, missing))
+    if errors:
+        raise errors[0]
+
+
+def _lacking(pattern: str, source: FrameFile, method: str, missing: frozenset[str]) -> InputError:
+    names = [name for name in layers(source.channels) if name]
+    there = f" (layers: {', '.join(names)})" if names else ""
+    if "motion" in missing:
+        return InputError(
+            f"{pattern} has no motion vectors{there}; name several frames, such as "
+            f"'shot.####{source.path.suffix}', to find the motion in their pictures, or "
+            "give a `camera` file for frames with depth"
+        )
+    able = [name for name in frame_methods() if METHODS[name].needs <= {"color", "motion"}]
+    return InputError(
+        f"{pattern} has no depth{there}; {method} needs it, {' and '.join(able)} do not"
+    )

@@ -46,6 +46,11 @@ class Stages:
         self.numbers: Sequence[int] = clip.numbers
 
     @property
+    def messages(self) -> list[str]:
+        """Lines that a user should know, once the frames are blurred."""
+        return []
+
+    @property
     def total(self) -> int:
         """Number of frames."""
         return len(self.numbers)

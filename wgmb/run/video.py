@@ -94,20 +94,11 @@ class VideoRequest(SettingsGroups):
         motion, how = self.video.source(blur.device)
         at_edges = None
         if self.video.is_by_place(blur.device) and self.blur.method is None:
-            at_edges = self._at_edges(shutter.make(), blur)
+            at_edges = self.blur.at_edges(shutter.make(), blur.device)
         if self.shutter.seconds is not None:
             shutter = replace(shutter, shutter=self.shutter.shutter)
         shown = replace(self, blur=settings, shutter=shutter)
         return VideoRun(shown, blur, motion, how, at_edges)
-
-    def _at_edges(self, shutter: Shutter, blur: Blur) -> Blur | None:
-        """The blur of pictures with edges of motion: gather there, if its options fit."""
-        own = getattr(self.blur, "where", None) or "edges"  # a method's option
-        try:
-            settings = replace(self.blur, method="gather", where=own)
-            return settings.for_pictures().make(shutter, blur.device)
-        except InputError:  # an option of the other method
-            return None
 
 
 @dataclass(frozen=True)
@@ -185,6 +176,7 @@ class VideoRun:
             self.blur,
             self.motion,
             clock=plan.clock,
+            has_own_times=plan.wanted.has_own_times,
             holdout=holdout_of(request.blur.holdout, plan.reader),
             at_edges=self.at_edges,
             fill=request.video.duplicates == "fill",

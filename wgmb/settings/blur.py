@@ -6,6 +6,7 @@ from typing import Any, Literal, Self, TypeVar
 
 import wgpu
 
+from ..errors import InputError
 from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
 from ..pipeline.arguments import checked, method_of
@@ -100,6 +101,15 @@ class BlurSettings:
         if method and "shading" in set(options_of(method.Options)) - set(self._method_options()):
             unset["shading"] = "off"
         return replace(self, **unset)
+
+    def at_edges(self, shutter_: Shutter, device: wgpu.GPUDevice) -> Blur | None:
+        """The Blur of pictures with edges of motion: gather there; None for options of others."""
+        own = getattr(self, "where", None) or "edges"  # a method's option
+        try:
+            settings = replace(self, method="gather", where=own)
+            return settings.for_pictures().make(shutter_, device)
+        except InputError:
+            return None
 
     def make(self, shutter_: Shutter, device: wgpu.GPUDevice | str | None = None) -> Blur:
         """Return the Blur these settings describe; an option of another method is an error."""

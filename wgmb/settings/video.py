@@ -45,9 +45,7 @@ class FlowSettings:
         if settings.flow == "none":
             return None, how
         if self.is_by_place(device):
-            from ..flow.dis.by_place import ByPlace
-
-            return ByPlace(), f"{how}; finer, and searched in blocks, where something is fast"
+            return by_place(), how
         if settings.flow == "dis":
             from ..flow.dis import Dis  # only where it is needed
 
@@ -72,6 +70,8 @@ class FlowSettings:
         if flow == "auto" and software and not is_draft:
             flow, quality = ("dis", "fast") if is_installed("cv2") else ("search", "draft")
             why = f" ({quality}, because there is no GPU)"
+            if flow == "dis":
+                why += "; finer, and searched in blocks, where something is fast"
         flow = "dis" if flow == "dis" else "search"
         words = "dense inverse search" if flow == "dis" else "search"
         return replace(self, flow=flow, flow_quality=quality), f"{words}{why}"
@@ -157,6 +157,13 @@ class VideoSettings(FlowSettings):
             end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
         begin = reader.begin(others) if first is None else first
         return Clock(begin, self.pace, Fraction(0), first, end)
+
+
+def by_place() -> MotionSource:
+    """The source that "auto" becomes without a GPU."""
+    from ..flow.dis.by_place import ByPlace  # only where it is needed
+
+    return ByPlace()
 
 
 def time_of(name: str, text: str | None) -> Fraction | None:

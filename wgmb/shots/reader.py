@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from ..exposure import Cell, cells_in_shot
 from ..shutter import Shutter
@@ -26,6 +26,25 @@ T = TypeVar("T")
 
 class NoPicturesError(Exception):
     """There is no picture at all."""
+
+
+class Shots(Protocol[T]):
+    """Pictures by their indices, and where motion leads from one to another."""
+
+    tolerance: float
+    """By how much their times may be rounded [s]."""
+
+    def __getitem__(self, index: int) -> Picture[T]:
+        """A picture that is there; KeyError for others."""
+        ...
+
+    def same_shot(self, index: int, other: int) -> bool:
+        """True if two pictures are there, and no cut lies between them."""
+        ...
+
+    def moves_on(self, index: int, other: int) -> bool:
+        """True if two pictures are there, and neither a cut nor a flash lies between them."""
+        ...
 
 
 class ShotReader(Generic[T]):

@@ -20,7 +20,7 @@ from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import ExposureSum, Part
 from ..shots.motion import MotionSource, window
-from ..shots.reader import FLASH, Picture, ShotReader
+from ..shots.reader import FLASH, Picture, ShotReader, Shots
 from ..shutter import Shutter
 from .changing_light import ChangingLight, LightChanges
 from .clock import Clock
@@ -104,16 +104,18 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        changing = ChangingLight(self.device)
-        frames = VideoFrames(
-            shots, self._at_edges or self._blur, self._motion, self.holdout, self._planes, changing
-        )
+        frames = self.frames(shots)
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, frames, cells)
 
+    def frames(self, shots: Shots[Thumbnail]) -> VideoFrames:
+        """The textures of pictures, for Exposure."""
+        blur, changing = self._at_edges or self._blur, ChangingLight(self.device)
+        return VideoFrames(shots, blur, self._motion, self.holdout, self._planes, changing)
+
     def light(
-        self, shots: ShotReader[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]
+        self, shots: Shots[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
         light, changes = self._blurred(shots, frames, cells)
@@ -132,7 +134,7 @@ class Exposures:
 
     def coded(
         self,
-        shots: ShotReader[Thumbnail],
+        shots: Shots[Thumbnail],
         frames: VideoFrames,
         cells: Sequence[Cell],
         coding: Coding,
@@ -148,7 +150,7 @@ class Exposures:
 
     def _blurred(
         self,
-        shots: ShotReader[Thumbnail],
+        shots: Shots[Thumbnail],
         frames: VideoFrames,
         cells: Sequence[Cell],
         is_coded: bool = False,
@@ -181,6 +183,8 @@ class Exposures:
 class VideoBlur(Exposures):
     """The exposures of a video. `clock`: the time of its pictures in the output.
 
+    `has_own_times`: output frames have the times of pictures, as the file rounds them.
+
     All else: see Exposures. InputError for expanded light where the video holds light above white.
     """
 
@@ -191,6 +195,7 @@ class VideoBlur(Exposures):
         motion: MotionSource | None,
         *,
         clock: Clock = Clock(),  # noqa: B008  it is frozen
+        has_own_times: bool = False,
         **more: Any,
     ):
         pace = float(clock.speed)
@@ -198,17 +203,18 @@ class VideoBlur(Exposures):
         super().__init__(blur, motion, **more)
         self._planes.expansion.check_video(reader.path, reader.coding)
         self.reader, self.clock = reader, clock
+        self._times = reader.times if has_own_times else reader.exact_times
 
     def pictures(
         self, shutter: Shutter, wanted: Sequence[OutputFrame]
     ) -> Iterator[Picture[Thumbnail]]:
         """The video's pictures from before the first exposure to the end, on the output's clock."""
-        times = self.reader.times
+        times = self._times
         opens = (
             self.clock.back(wanted[0].time)
             + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
         )
-        first = int(np.searchsorted(times.seconds, float(opens)))
+        first = int(np.searchsorted(self.reader.times.seconds, float(opens)))
         first, none = max(first - _BEFORE, 0), True
         for number, picture in self.reader.pictures(first):
             none = False
@@ -225,7 +231,7 @@ class Exposure:
     """An output frame, made when it is asked for as what is wanted."""
 
     _run: Exposures
-    _shots: ShotReader[Thumbnail]
+    _shots: Shots[Thumbnail]
     _frames: VideoFrames
     _cells: Sequence[Cell]
 

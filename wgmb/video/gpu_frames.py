@@ -14,7 +14,7 @@ from ..gpu.textures import TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion import MotionSource
-from ..shots.reader import ShotReader
+from ..shots.reader import Shots
 from .changing_light import ChangingLight, Surroundings, shares_of
 from .holdouts import Holdout
 from .motion import VideoMotion
@@ -36,7 +36,7 @@ class VideoFrames:
 
     def __init__(
         self,
-        shots: ShotReader[Thumbnail],
+        shots: Shots[Thumbnail],
         blur: Blur,
         motion: MotionSource | None = None,
         holdout: Holdout | None = None,

@@ -11,7 +11,7 @@ import numpy as np
 from ..color.srgb import srgb
 from ..errors import InputError, counted, size_text
 from ..io import stills
-from ..shots.reader import ShotReader
+from ..shots.reader import Shots
 from .displays import Displays
 from .read.reader import VideoReader
 from .static_areas import overlay_of
@@ -38,8 +38,8 @@ class Holdout:
     always: bool = False
     shares: dict[int, float] = field(default_factory=dict)
 
-    def of(self, shots: ShotReader[Thumbnail]) -> Held:
-        """Masks of the pictures that a ShotReader keeps, by their indices there."""
+    def of(self, shots: Shots[Thumbnail]) -> Held:
+        """Masks of pictures, by their indices."""
         found = Displays(lambda index: shots[index].content.grey, shots.moves_on, self.always)
 
         def held(index: int) -> np.ndarray | None:

@@ -12,7 +12,7 @@ from ..flow.dis import DisShot
 from ..flow.dis.by_place import PlaceShot
 from ..gpu.textures import TexturePool
 from ..shots.motion import Found, MotionSource, ShotMotion
-from ..shots.reader import ShotReader
+from ..shots.reader import Shots
 from .planes import Planes
 from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
@@ -21,7 +21,7 @@ Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]
 
 
 class VideoMotion(ShotMotion):
-    """The motion of the pictures that a ShotReader keeps, by their indices there, nowhere ragged.
+    """The motion of pictures in time, by their indices, nowhere ragged.
 
     Flow takes them as textures of `device`, in light that is not expanded, others as grey. What is
     smooth, as dense inverse search is, is left as it is.
@@ -30,7 +30,7 @@ class VideoMotion(ShotMotion):
     def __init__(
         self,
         source: MotionSource,
-        shots: ShotReader[Thumbnail],
+        shots: Shots[Thumbnail],
         device: wgpu.GPUDevice,
         depth: bool = True,
     ):
@@ -90,9 +90,9 @@ class VideoMotion(ShotMotion):
 
 
 class _Searched:
-    """Pictures that a ShotReader keeps, as they are searched."""
+    """Pictures in time, as they are searched."""
 
-    def __init__(self, shots: ShotReader[Thumbnail], device: wgpu.GPUDevice):
+    def __init__(self, shots: Shots[Thumbnail], device: wgpu.GPUDevice):
         self._shots, self._planes = shots, Planes(device)
         self._images = TexturePool(device)
 

@@ -82,6 +82,11 @@ class OutputFrames(Sequence[OutputFrame]):
         )
 
     @property
+    def has_own_times(self) -> bool:
+        """True if each has the time of a picture, not that of a rate."""
+        return self._own is not None
+
+    @property
     def times(self) -> Sequence[Fraction]:
         """Their times [s]; nothing is listed."""
         return _Times(self)

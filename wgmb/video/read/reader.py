@@ -6,7 +6,7 @@ as they are stored (color/coding.py), upright and without interlacing. Colours a
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice
@@ -233,6 +233,11 @@ class VideoReader:
     def times(self) -> Times:
         """Times of the pictures [s]: ascending Fractions."""
         return self._timeline.times
+
+    @property
+    def exact_times(self) -> Sequence[Fraction]:
+        """The times [s], those of the rate where the file rounds that to its ticks."""
+        return self._timeline.exact
 
     @property
     def rate(self) -> Fraction:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from math import lcm
 from pathlib import Path
 from typing import overload
 
@@ -133,9 +134,25 @@ class Timeline:
         """Return True if all times are those of a rate, rounded to ticks alike."""
         step = float(1 / (rate * self.times.base))
         since = self.times.ticks - self.times.ticks[0]
-        places = np.rint(since / step)
+        places = self._places(rate)
         off = since - places * step
         return bool(np.median(np.diff(places)) == 1 and off.max() - off.min() < _ROUNDED)
+
+    def _places(self, rate: Fraction) -> np.ndarray:
+        """Intervals of a rate from the first picture to each, in whole numbers."""
+        return np.rint((self.times.ticks - self.times.ticks[0]) * float(self.times.base * rate))
+
+    @cached_property
+    def exact(self) -> Sequence[Fraction]:
+        """The times, those of the rate where all are that, rounded to ticks."""
+        if len(self.times) < 2 or not self._keeps(self.rate):
+            return self.times
+        finest = lcm(self.times.base.denominator, self.rate.numerator)
+        base = Fraction(1, finest)
+        first = int(self.times[0] / base)
+        return Times(
+            first + self._places(self.rate).astype(np.int64) * int(1 / self.rate / base), base
+        )
 
     @property
     def is_variable(self) -> bool:

@@ -1,4 +1,5 @@
 // Signals of a picture, R, G, B and straight alpha -> linear light, premultiplied by alpha.
+// Without ALPHA they are premultiplied already, and their alpha is kept.
 //#include common/frame.wgsl
 //#include common/highlights.wgsl
 //#include common/transfer.wgsl
@@ -12,5 +13,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let signal = textureLoad(signals, id.xy, 0);
     let alpha = select(1.0, signal.w, ALPHA);
-    textureStore(output, id.xy, vec4f(expanded(light_of(signal.xyz)) * alpha, alpha));
+    textureStore(output, id.xy, vec4f(expanded(light_of(signal.xyz)) * alpha, signal.w));
 }
