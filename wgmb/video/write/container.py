@@ -234,6 +234,23 @@ class PictureStream:
         return packets
 
 
+def stream_like(
+    container: OutputContainer, source: VideoStream, format: VideoFormat
+) -> VideoStream:
+    """Add a stream for packets of a file that was written in this format.
+
+    That of an encoder states its rate, which FFmpeg needs for a time code in MP4 and MOV.
+    """
+    if views.are_stated(format.facts):  # only a copied stream states them
+        into = container.add_stream_from_template(source, opaque=True)
+        into.time_base = format.base
+        name_codec(into, format.encoding)
+        return into
+    into = begin(container, format)
+    into.codec_context.extradata = source.codec_context.extradata  # in the form of its packets
+    return into
+
+
 def begin(container: OutputContainer, format: VideoFormat) -> VideoStream:
     """Add a stream of pictures to a container, and start its encoder."""
     encoding, aspect = format.encoding, format.facts.pixel_aspect

@@ -29,7 +29,7 @@ from ...errors import InputError
 from ...io import atomic, leftovers, record
 from ..read.container import opened, picture_stream
 from . import views
-from .container import NewFile, name_codec
+from .container import NewFile, stream_like
 from .format import VideoFormat
 from .other_streams import OtherStreams
 from .writer import VideoWriter
@@ -125,9 +125,7 @@ class Segments:
             with opened(path, is_known=True) as container:
                 stream = picture_stream(container, path)
                 if into is None:
-                    into = file.container.add_stream_from_template(stream, opaque=True)
-                    into.time_base = self._format.base
-                    name_codec(into, self._format.encoding)
+                    into = stream_like(file.container, stream, self._format)
                     if others is not None:
                         left_out += others.attach(file.container)
                 for packet, number in self._timed(container.demux(stream), order, delay):
