@@ -99,6 +99,32 @@ def test_imports_point_upwards_in_the_table_and_third_parties_stay_at_home(file)
             assert folder in HOMES[module[0]], f"{folder} imports {module[0]}"
 
 
+def loaded_with(file: Path) -> set[Path]:
+    """The modules of wgmb that a module names at its top, those for types alone too."""
+    here = ("wgmb", *file.relative_to(PACKAGE).with_suffix("").parts)
+    found, nodes = set(), list(ast.parse(file.read_text()).body)
+    while nodes:
+        node = nodes.pop()
+        if isinstance(node, ast.ImportFrom) and node.level:
+            module = [*here[: -node.level], *(node.module or "").split(".")]
+            for name in ("", *(alias.name for alias in node.names)):
+                path = PACKAGE.joinpath(*module[1:], name).with_suffix(".py")
+                found |= {path} if path.is_file() else set()
+        elif not isinstance(node, ast.FunctionDef):
+            nodes += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt)]
+    return found - {file}
+
+
+def test_no_module_needs_itself():
+    """No circle of imports, not even of types; one pair shares the class of an EXR's part."""
+    needs = {file: loaded_with(file) for file in FILES}
+    assert needs[PACKAGE / "run" / "job.py"] >= {PACKAGE / "run" / "report.py"}
+    needs[PACKAGE / "io" / "lossy.py"].discard(PACKAGE / "io" / "exr.py")
+    while free := [file for file, others in needs.items() if not others & needs.keys()]:
+        needs = {file: others for file, others in needs.items() if file not in free}
+    assert not needs
+
+
 @pytest.mark.parametrize("file", TOOLS, ids=lambda f: str(f.relative_to(ROOT)))
 def test_tools_import_modules_that_are_there(file):
     for module in imported(file, ROOT):

@@ -31,7 +31,8 @@ from .draw.renderer import Renderer
 from .draw.request import Drawn, Request
 from .draw.screen import Screen, ScreenThread
 from .panel import inspector, overlay
-from .panel.panel import Info, Panel
+from .panel.info import Info
+from .panel.panel import Panel
 from .panel.scopes import Scopes
 from .panel.theme import style
 from .scaled_canvas import SIZES, ScaledCanvas

@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
 
 from ..controls import Box
-from ..draw.frame_status import FrameStatus
-from ..draw.request import Available
 from ..state.state import State
 from ..state.video_time import output, output_frame
 from ..state.words import for_shell
 from . import overlay, sections
+from .info import Info
 from .widgets import Widgets
 
 WIDTH = 320.0  # of the panel [logical px]
 _HIGH, _TALL = 830.0, 1000.0  # windows so high show more opened, and all [logical px]
-
-
-@dataclass
-class Info:
-    """Contents of the panel: status, measurements and available choices."""
-
-    report: FrameStatus
-    adapter: str
-    available: Available
-    frame_times: np.ndarray  # seconds, the last one last
-    draw_times: np.ndarray
-    passes: dict[str, float] = field(default_factory=dict)
-    recording: str = ""
-    export: str = ""
-    message: str = ""
-    recent: list[str] = field(default_factory=list)
-    """Files that were looked at before."""
 
 
 class Panel:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -25,6 +24,7 @@ from ..state.state import (
     State,
 )
 from ..state.video_time import in_frames
+from .info import Info
 from .theme import (
     ACCENT,
     COLORS,
@@ -33,9 +33,6 @@ from .theme import (
 )
 from .video_section import video
 from .widgets import LOG, Widgets, plain
-
-if TYPE_CHECKING:
-    from .panel import Info
 
 # ---- what is seen ---------------------------------------------------------------------------
 

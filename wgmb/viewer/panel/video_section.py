@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ...color.highlights import MOST
 from ..state.state import FLOWS, QUALITIES, State
 from ..state.video_time import SOURCE, at_rate, check, rate
+from .info import Info
 from .widgets import Widgets
-
-if TYPE_CHECKING:
-    from .panel import Info
 
 
 def video(ui: Widgets, state: State, info: Info) -> State:

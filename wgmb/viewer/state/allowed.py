@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 from ...errors import InputError
 from ...settings.color import option_name
 from .groups import GROUP_OF, MASKS, changed
-
-if TYPE_CHECKING:
-    from .state import State
+from .shown_moment import ShownMoment
 
 VIDEO = frozenset(name for name, group in GROUP_OF.items() if group == "video")
 """Options of videos."""
@@ -21,7 +18,7 @@ OF_VIDEOS = frozenset({"holdout", "max_mb", "cuts"})
 _BLURRED = frozenset({"flow", "flow_quality", "highlights"})  # that `wgmb blur` has for frames, too
 
 
-def check_options(state: State, named: Collection[str]) -> None:
+def check_options(state: ShownMoment, named: Collection[str]) -> None:
     """InputError for an option of the command line that the state's source has no use for."""
     for name in named:
         option = option_name(name)
@@ -40,7 +37,7 @@ def check_options(state: State, named: Collection[str]) -> None:
             _check_layers(name)
 
 
-def check_video(state: State) -> None:
+def check_video(state: ShownMoment) -> None:
     """InputError if the state of a video holds what only rendered frames have."""
     for name in (*changed("input", state.input), *changed("blur", state.blur)):
         _check_layers(name)

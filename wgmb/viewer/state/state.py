@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,9 @@ from ...settings.video import VideoSettings
 from . import toml as saved
 from . import video_time
 from .allowed import check_options
-from .files import frames_of, is_video_file
+from .files import frames_of
 from .groups import DEFAULTS, GROUP_OF, MASKS, written
+from .shown_moment import ShownMoment
 from .words import no_option, words_of
 
 COMPARE = ("off", "wipe", "split", "difference", "flicker")
@@ -42,9 +42,6 @@ FLOWS, QUALITIES = ("auto", "search", "dis", "none"), ("best", "fast", "draft")
 REFERENCE = "reference"
 KEPT = "B"
 """The image by the settings that were kept."""
-_SCENE = SceneSettings(size="1280x720", antialias=2)
-_BLUR = BlurSettings(method="gather")
-_SHUTTER = ShutterSettings().resolved()
 
 
 @dataclass(frozen=True)
@@ -69,30 +66,8 @@ class Kept:
 
 
 @dataclass(frozen=True)
-class State:
+class State(ShownMoment):
     """A scene or frames on disk, how they are blurred, and how that is shown."""
-
-    source: str = "crossing"
-    """A scene's name, or a file or pattern."""
-    scene: SceneSettings = _SCENE
-    """Size, parameters and camera of a scene."""
-    input: InputSettings = field(default_factory=InputSettings)
-    """Layers and conventions of files."""
-    blur: BlurSettings = _BLUR
-    """The method, which is always set, and its options."""
-    shutter: ShutterSettings = _SHUTTER
-    """Angle and curve are always set."""
-    color: ColorSettings = field(default_factory=ColorSettings)
-    video: VideoSettings = field(default_factory=VideoSettings)
-    """Motion and time of a video; its encoding, which an export has."""
-    frames: str = "0-11"
-    """Of a video: its pictures that the output is made from."""
-    frame: float = 0.0
-    """The moment [frame intervals]; of a video the output frame, from 0 on."""
-    fps: float = 24.0
-    """Of a video: of the output, whose interval the shutter is in."""
-    own_times: bool = False
-    """Of a video: `fps` is "source", an output frame for each picture, at its time."""
 
     look: str = "result"
     eyes: str = ""
@@ -119,16 +94,6 @@ class State:
     """Numbers under the mouse are shown."""
     arrows: bool = False
     """Motion is drawn as arrows."""
-
-    @property
-    def is_scene(self) -> bool:
-        """True if `source` is a built-in scene."""
-        return self.source in builtin.SCENES
-
-    @property
-    def is_video(self) -> bool:
-        """True if `source` is a video."""
-        return not self.is_scene and is_video_file(self.source)
 
     @property
     def method(self) -> str:
@@ -229,9 +194,7 @@ class State:
     @property
     def span(self) -> tuple[int, int]:
         """First and last frame of `frames`; of a video, of the output."""
-        if self.is_video:
-            return 0, len(video_time.output(self).frames) - 1
-        return _ends(self.frames)
+        return video_time.span(self)
 
     def opened(self, source: str, max_mb: float = limits.MAX_MB) -> State:
         """The same state with another scene or other files, seen anew.
@@ -285,9 +248,7 @@ class State:
 
     def settled(self) -> State:
         """The same, its moment within its frames."""
-        first, last = self.span
-        frame = min(max(self.frame, first), last) if math.isfinite(self.frame) else float(first)
-        return replace(self, frame=frame)
+        return video_time.settled(self)
 
     def unmoved(self) -> State:
         """The same, seen from where the scene's own camera is."""
@@ -404,10 +365,3 @@ class State:
 
 
 _SHOWING = (*(name for name in saved.VIEW if name != "frame"), "help", "kept", "inspect", "arrows")
-
-
-@lru_cache(maxsize=8)
-def _ends(frames: str) -> tuple[int, int]:
-    """First and last of frame numbers; to read them takes a tenth of a frame of the window."""
-    numbers = frame_numbers.frame_numbers(frames)
-    return min(numbers), max(numbers)

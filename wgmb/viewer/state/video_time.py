@@ -1,4 +1,4 @@
-"""The time of a video that a State is about: its output frames, and how they pass."""
+"""The time of what is shown: the output frames of a video, and how they pass."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from typing import Any, TypeVar
 
 from ...color.coding import HLG, PQ
 from ...io.frame_numbers import frame_numbers
@@ -18,15 +19,15 @@ from .files import (
     output_of,
     reader_of,
 )
+from .shown_moment import ShownMoment
 
-if TYPE_CHECKING:
-    from .state import State
+_Shown = TypeVar("_Shown", bound=ShownMoment)
 
 SOURCE = "source"
 """As a rate: an output frame for each picture of a video, at its time."""
 
 
-def check(state: State) -> None:
+def check(state: ShownMoment) -> None:
     """InputError for options that make no sense."""
     video = state.video
     if video.expansion:
@@ -35,36 +36,36 @@ def check(state: State) -> None:
     _ = video.pace, video.range
 
 
-def own_rate(state: State) -> Fraction:
+def own_rate(state: ShownMoment) -> Fraction:
     """Pictures a second of the video."""
     return reader_of(state.source, state.input.max_mb).rate
 
 
-def is_own_rate(state: State) -> bool:
+def is_own_rate(state: ShownMoment) -> bool:
     """Return True if the video keeps a steady rate, and the output has it too."""
     has_rate = reader_of(state.source, state.input.max_mb).has_rate
     return has_rate and rate(state) == own_rate(state)
 
 
-def at_own_rate(state: State) -> State:
+def at_own_rate(state: _Shown) -> _Shown:
     """The same at the rate of the video, or at the times of its pictures if it keeps no rate."""
     reader = reader_of(state.source, state.input.max_mb)
     return replace(state, own_times=not reader.has_rate, fps=float(reader.rate))
 
 
-def is_hdr(state: State) -> bool:
+def is_hdr(state: ShownMoment) -> bool:
     """Return True if the video holds light above white."""
     return reader_of(state.source, state.input.max_mb).coding.transfer in (PQ, HLG)
 
 
-def rate(state: State) -> Fraction:
+def rate(state: ShownMoment) -> Fraction:
     """Output frames a second, exactly; of a scene or frames too."""
     if state.is_video and state.fps == float(own := own_rate(state)):
         return own
     return Fraction(state.fps).limit_denominator(1001)
 
 
-def completed(state: State, named: Collection[str]) -> State:
+def completed(state: _Shown, named: Collection[str]) -> _Shown:
     """The same with the video's own rate and all of its pictures, unless others were said."""
     if "fps" not in named:
         state = at_own_rate(state)
@@ -75,7 +76,7 @@ def completed(state: State, named: Collection[str]) -> State:
     return state
 
 
-def output(state: State) -> VideoOutput:
+def output(state: ShownMoment) -> VideoOutput:
     """The output frames; InputError if the part that is chosen holds none."""
     most = state.input.max_mb
     frames = None if state.frames == frames_of(state.source, most) else state.frames
@@ -83,13 +84,34 @@ def output(state: State) -> VideoOutput:
     return output_of(reader, frames, state.video, fps)
 
 
-def output_frame(state: State) -> OutputFrame:
+def span(state: ShownMoment) -> tuple[int, int]:
+    """First and last frame of `frames`; of a video, of the output."""
+    if state.is_video:
+        return 0, len(output(state).frames) - 1
+    return _ends(state.frames)
+
+
+@lru_cache(maxsize=8)
+def _ends(frames: str) -> tuple[int, int]:
+    """First and last of frame numbers; to read them takes a tenth of a frame of the window."""
+    numbers = frame_numbers(frames)
+    return min(numbers), max(numbers)
+
+
+def settled(state: _Shown) -> _Shown:
+    """The same, its moment within its frames."""
+    first, last = span(state)
+    frame = min(max(state.frame, first), last) if math.isfinite(state.frame) else float(first)
+    return replace(state, frame=frame)
+
+
+def output_frame(state: ShownMoment) -> OutputFrame:
     """The output frame that is shown."""
     frames = output(state).frames
     return frames[min(max(math.floor(state.frame), 0), len(frames) - 1)]
 
 
-def held_for(state: State, number: int) -> float:
+def held_for(state: ShownMoment, number: int) -> float:
     """Duration of an output frame [s]: until the next one."""
     frames = output(state).frames
     if number + 1 < len(frames):
@@ -97,7 +119,7 @@ def held_for(state: State, number: int) -> float:
     return float(frames[number].interval)
 
 
-def retimed(state: State, **changes: Any) -> State:
+def retimed(state: _Shown, **changes: Any) -> _Shown:
     """The same with other options, at the same time in the video."""
     at = output(state).clock.back(output_frame(state).time)
     state = replace(state, **changes)
@@ -105,15 +127,15 @@ def retimed(state: State, **changes: Any) -> State:
     return replace(state, frame=float(now.frames.nearest(now.clock.out(at))))
 
 
-def in_frames(state: State, text: str) -> State:
+def in_frames(state: _Shown, text: str) -> _Shown:
     """The same with other frames, or, of a video, other pictures to make the output from."""
     frame_numbers(text)
     if state.is_video:
         return retimed(state, frames=text)
-    return replace(state, frames=text).settled()
+    return settled(replace(state, frames=text))
 
 
-def at_rate(state: State, text: str) -> State:
+def at_rate(state: _Shown, text: str) -> _Shown:
     """The same at another rate: a number of frames per second, or, of a video, SOURCE."""
     if state.is_video and text == SOURCE:
         return retimed(state, own_times=True, fps=float(own_rate(state)))
@@ -121,7 +143,7 @@ def at_rate(state: State, text: str) -> State:
     return retimed(state, own_times=False, fps=fps) if state.is_video else replace(state, fps=fps)
 
 
-def passed(state: State, seconds: float) -> float:
+def passed(state: ShownMoment, seconds: float) -> float:
     """The frame that is shown `seconds` later, without an end; of a scene or frames too."""
     frames = float(rate(state))
     if not (state.is_video and state.own_times):
