@@ -300,6 +300,16 @@ def test_what_a_file_has_besides_its_pictures_is_said(tmp_path):
     assert b"only its pictures go through a pipe; left out: audio\n" in done.stderr
 
 
+def test_what_a_file_has_lost_is_said_as_without_a_pipe(tmp_path):
+    path = clips.write(tmp_path / "a.mkv", codec="ffv1")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    plain = VideoReader(path)
+    assert len(list(plain)) < 12 and plain.loss()
+    done = wgmb(path, "-o", "-", "--flow", "none", "--duplicates", "fill")
+    assert done.returncode == 1 and plain.loss() in done.stderr.decode()
+    assert b"no repeated picture found\n" in done.stderr
+
+
 def test_a_stream_of_uneven_times_is_refused_and_pauses_leave_places(tmp_path):
     frames = [clips.frame(clips.planes(n), "yuv420p") for n in range(6)]
 

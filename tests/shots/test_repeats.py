@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
 
+from wgmb.shots.cadence import at_own_times
 from wgmb.shots.reader import Picture, ShotReader
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.scan import scan_video
@@ -132,6 +133,57 @@ def test_a_slow_fade_keeps_its_brightness(tmp_path):
     filled = np.interp(range(60), kept, [levels[n] for n in kept])
     assert np.abs(filled - levels).max() < 0.5
     assert len(left) < 10
+
+
+def own_times(numbers, rate=30.0):
+    """The times of pictures that are left of a file, counted in its intervals."""
+    pictures = [Picture(number / rate, None, number) for number in numbers]
+    return rate * np.array([picture.time for picture in at_own_times(iter(pictures))])
+
+
+@pytest.mark.parametrize("ratio", [(4, 5), (2, 5), (5, 6), (3, 5), (3, 4), (2, 3)])
+@pytest.mark.parametrize("phase", [0, 1, 2])
+def test_a_cadence_gets_even_times(ratio, phase):
+    """Film of 24 in 30 and in 60, 25 in 30, 30 in 50, 18 in 24, 20 in 30."""
+    shown, of = ratio
+    places = [n for n in range(60 * of // shown) if n * shown // of != (n - 1) * shown // of]
+    numbers = np.array(places[phase:])
+    times = own_times(numbers)
+    np.testing.assert_allclose(np.diff(times), of / shown, rtol=1e-9)
+    assert np.abs(times - numbers).max() < 1 and abs((times - numbers).mean()) < 0.05
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        range(40),
+        range(0, 80, 2),
+        [n for n in range(60) if n not in (7, 19, 22, 41)],
+        [n for n in range(60) if n not in (9, 39)],
+        [*range(30), *range(30, 90, 2)],
+        [0, 2, 3, 4, 5, 7, 8, 9],
+    ],
+    ids=["none", "twos", "lost ones", "two lost ones", "another rate", "too few"],
+)
+def test_without_a_cadence_times_stay(numbers):
+    np.testing.assert_allclose(own_times(numbers), list(numbers), rtol=1e-9)
+
+
+def test_times_ascend_where_a_cadence_breaks():
+    """An edit of film of 24 in 30: a picture is shown for three places, or for two in a row."""
+    for at in range(40, 46):
+        numbers = [n if n < at else n + 2 for n in range(90) if n % 5 != 1]
+        times = own_times(numbers)
+        gaps = np.diff(times)
+        assert gaps.min() > 0.4 and np.abs(times - numbers).max() < 1
+        assert (np.abs(gaps - 1.25) > 1e-6).sum() <= 2
+
+
+def test_uneven_times_of_a_file_stay():
+    numbers = [n for n in range(60) if n % 5 != 1]
+    uneven = [n + 0.4 * (n % 3) for n in numbers]
+    pictures = [Picture(t, None, n) for t, n in zip(uneven, numbers, strict=True)]
+    assert [picture.time for picture in at_own_times(iter(pictures))] == uneven
 
 
 def test_what_is_seen_of_a_change():

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import counted
 from ..io.frame_numbers import frame_list, numbered
-from ..run.report import BatchReport
+from ..run.report import BatchReport, VideoReport
 from ..sequence.frame_file import odd_sizes
 from . import terminal
 from .exit_codes import DONE, SOME_FAILED
@@ -99,6 +99,18 @@ def cuts_told(cuts: Iterable[int], noun: str) -> str:
     """The line about camera cuts: before frame 4, before pictures 4,9."""
     numbers = sorted(cuts)
     return f"camera {'cut' if len(numbers) == 1 else 'cuts'} before {numbered(numbers, noun)}"
+
+
+def pictures_told(report: VideoReport, fills: bool) -> list[str]:
+    """Lines on what was seen in a video, some empty; `fills`: repeated pictures are left out."""
+    flashes = ", ".join(map(str, report.flashes))
+    return [
+        cuts_told(report.cuts, "picture") if report.cuts else "",
+        f"flash at picture {flashes}" if flashes else "",
+        repeats_told(report.repeated) if fills else "",
+        report.held_out,
+        report.scaling,
+    ]
 
 
 def repeats_told(count: int) -> str:

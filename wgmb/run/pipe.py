@@ -56,6 +56,10 @@ class _Source:
     frames: Callable[[Form], Input[Any, Any]]
     notes: list[str]
     """Lines that a user should know."""
+    loss: Callable[[], str]
+    """What could not be read so far, in words."""
+    scaling: Callable[[], str] = str
+    """Pictures of another size, in words."""
 
     def format(self, encoding: Encoding, base: Fraction) -> tuple[VideoFormat, list[str]]:
         """The form in which the output is written; and what is lost, in words."""
@@ -105,8 +109,8 @@ def blur_pipe(
         engine.run(
             found.frames(coded_form(writer.coding)), sink, engine.RunOptions(progress=progress)
         )
-        loss = reader.loss if reader else ""
-        if reader and not sink.count:
+        loss = found.loss()
+        if not sink.count:
             raise InputError(loss or f"{_plain(source)}: holds no pictures")
         report = VideoReport(
             Path(source),
@@ -116,6 +120,7 @@ def blur_pipe(
             notes=found.notes,
             left_out=writer.left_out,
             loss=loss,
+            scaling=found.scaling(),
         )
         return run.described(report, found.exposures)
 
@@ -200,8 +205,9 @@ def _piped(reader: Reader, run: VideoRun, output: OutputSettings, fps_in: str | 
 
     space = reader.space if isinstance(reader, Y4mReader) else ""
     return _Source(
-        reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader.notes
-    )
+        reader.size, reader.coding, reader.facts, fps, space, made.exposures, frames, reader.notes,
+        lambda: reader.loss,
+    )  # fmt: skip
 
 
 def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
@@ -218,7 +224,10 @@ def _of_file(source: str, run: VideoRun, output: OutputSettings) -> _Source:
     rate = 1 / plan.wanted[0].interval
     kinds = [stream.kind for stream in reader.streams] + ["chapters"] * (reader.chapters > 0)
     notes = plan.notes + ([only_pictures(kinds)] if kinds else [])
-    return _Source(reader.size, reader.coding, reader.facts, rate, "", exposures, frames, notes)
+    return _Source(
+        reader.size, reader.coding, reader.facts, rate, "", exposures, frames, notes, reader.loss,
+        reader.scaling,
+    )  # fmt: skip
 
 
 def _writer(

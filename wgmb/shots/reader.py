@@ -14,6 +14,7 @@ from typing import Generic, Protocol, TypeVar
 
 from ..exposure import Cell, cells_in_shot
 from ..shutter import Shutter
+from .cadence import at_own_times
 from .picture import Picture as Picture
 from .repeats import Change, without_repeats
 
@@ -53,7 +54,7 @@ class ShotReader(Generic[T]):
     `is_cut(before, after)`: whether a cut lies between the contents of two pictures;
     `known_cuts`: numbers of pictures that begin a shot all the same.
     `change`: see repeats.py; pictures that only repeat the one before are left out, and the cells
-    of their neighbours reach over their time.
+    of their neighbours reach over their time; those of a cadence are evened out (cadence.py).
     `reach`: pictures that are kept before those asked for, and read beyond them.
     `flash`: how long a flash of several pictures lasts at most [s]. `tolerance`: by how much the
     file may have rounded a picture's time [s]; so much earlier, it is shown already.
@@ -72,7 +73,7 @@ class ShotReader(Generic[T]):
     ):
         self.doubles: list[int] = []
         if change is not None:
-            pictures = without_repeats(pictures, change, is_cut, self.doubles)
+            pictures = at_own_times(without_repeats(pictures, change, is_cut, self.doubles))
         self._pictures, self.tolerance, self._is_cut = pictures, tolerance, is_cut
         self._known_cuts, self._flash, self._reach = known_cuts, flash, reach
         self._kept: dict[int, Picture[T]] = {}

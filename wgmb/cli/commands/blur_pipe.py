@@ -13,7 +13,7 @@ from ...io.pipes import STDIN, STDOUT
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
-from ..console import Console, cuts_told
+from ..console import Console, pictures_told
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import check
 
@@ -37,8 +37,7 @@ def blur_pipe(
             source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
             color_in=color_in, tell=console.say, progress=check,
         )  # fmt: skip
-    cuts = cuts_told(report.cuts, "picture") if report.cuts else ""
-    console.say(*report.left_out, cuts, report.held_out)
+    console.say(*report.left_out, *pictures_told(report, request.video.duplicates == "fill"))
     where = "stdout" if output.output == STDOUT else output.output
     console.say(f"{counted(report.frames, 'frame')} -> {where}")
     if report.loss:

@@ -22,7 +22,7 @@ from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
-from ..console import Console, cuts_told, repeats_told
+from ..console import Console, pictures_told, repeats_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import is_batch, outputs_of, videos_of
@@ -76,12 +76,7 @@ def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
         report = run(plan, _estimated(tick, len(plan.wanted), run, console))
     console.say(*(f"{plan.name}: {text}" for text in report.left_out))
     if report.is_new:
-        cuts, flashes = report.cuts, ", ".join(map(str, report.flashes))
-        console.say(
-            cuts_told(cuts, "picture") if cuts else "",
-            f"flash at picture {flashes}" if flashes else "",
-            *_remarks(report, run),
-        )
+        console.say(*pictures_told(report, run.request.video.duplicates == "fill"))
         took = f"{report.seconds:.1f} s" + (f" with {report.method}" if report.method else "")
         console.say(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
     if report.loss:
