@@ -12,7 +12,7 @@ import pytest
 from PIL import Image, features
 
 import make_clips as clips
-from wgmb import blur_video
+from wgmb import InputError, blur_video
 from wgmb.cli.app import main
 from wgmb.io.pipes import STDOUT
 from wgmb.run.pipe import blur_pipe
@@ -310,3 +310,18 @@ def test_transparency_of_avif_that_is_not_read_is_said(tmp_path):
 def test_transparency_that_a_gif_loses_is_said_as_it_is(tmp_path):
     report = blur_video(animated(tmp_path / "a.apng", "PNG"), tmp_path / "b.gif", flow="none")
     assert any(line.startswith("wgmb writes no transparent GIF") for line in report.left_out)
+
+
+@pytest.mark.parametrize("to", ["b.mp4", "b.gif", "b.webm"])
+def test_a_lost_alpha_is_said_before_the_first_picture(tmp_path, capsys, to):
+    path = animated(tmp_path / "a.png", "PNG")
+
+    def refused(*given, **more):
+        raise InputError("no picture is made")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("wgmb.run.video.write", refused)
+        assert main(["blur", str(path), "-o", str(tmp_path / to), "--flow", "none"]) == 2
+    assert "transparen" in capsys.readouterr().err
+    assert main(["blur", str(path), "-o", str(tmp_path / to), "--flow", "none"]) == 0
+    assert capsys.readouterr().err.count("transparen") == 1

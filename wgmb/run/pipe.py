@@ -57,7 +57,7 @@ class _Source:
     notes: list[str]
     """Lines that a user should know."""
     loss: Callable[[], str]
-    """What could not be read so far, in words."""
+    """The loss so far, in words."""
     scaling: Callable[[], str] = str
     """Pictures of another size, in words."""
 
@@ -105,6 +105,8 @@ def blur_pipe(
         for text in found.notes:
             tell(f"{_plain(source)}: {text}")
         writer = _writer(output, found, encoding, stack, stdout)
+        for text in writer.left_out:
+            tell(text)
         sink = VideoSink(writer)
         engine.run(
             found.frames(coded_form(writer.coding)), sink, engine.RunOptions(progress=progress)

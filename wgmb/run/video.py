@@ -20,6 +20,7 @@ from ..pipeline.blur import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings
 from ..settings.groups import SettingsGroups, chosen, groups_of
 from ..settings.record import record
+from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..shots.motion import MotionSource
 from ..shots.reader import Picture
@@ -34,7 +35,7 @@ from ..video.thumbnail import Thumbnail
 from ..video.write.encoders import FINEST_RATE, SUFFIXES
 from .engine import Blurred, Input, IsDone
 from .report import Progress, VideoReport
-from .video_output import check_output, sounds_kept, write
+from .video_output import check_output, losses, sounds_kept, write
 from .video_sink import Form
 
 _ANY_RATE = Fraction(24)  # with which a Blur begins
@@ -47,6 +48,7 @@ class VideoPlan:
 
     reader: VideoReader
     output: OutputSettings
+    video: VideoSettings
     clock: Clock
     wanted: OutputFrames
     rate: str
@@ -58,6 +60,11 @@ class VideoPlan:
     def notes(self) -> list[str]:
         """Lines that a user should know."""
         return [*self.reader.notes, *filter(None, (self.rate, self.remark))]
+
+    @property
+    def losses(self) -> list[str]:
+        """Lines about what pictures lose in the output; they are in the report, too."""
+        return losses(self.reader, self.output, self.video)
 
     @property
     def fps(self) -> Fraction:
@@ -154,7 +161,7 @@ class VideoRun:
         clock = video.clock(reader, self.request.input.frames, sounds_kept(reader, output, video))
         fps, said = _rate(reader, output)
         wanted = OutputFrames(reader, clock, fps, video.longest_pause)
-        return VideoPlan(reader, output, clock, wanted, said, self.request.shutter.remark)
+        return VideoPlan(reader, output, video, clock, wanted, said, self.request.shutter.remark)
 
     def at(self, fps: Fraction | None) -> VideoRun:
         """The same with its shutter in degrees, of frames at this rate of the output.

@@ -65,6 +65,17 @@ def sounds_kept(reader: VideoReader, output: OutputSettings, video: VideoSetting
     return sounds_in(reader.path, suffix, is_encoded=video.pace != 1)
 
 
+def losses(reader: VideoReader, output: OutputSettings, video: VideoSettings) -> list[str]:
+    """Lines about what pictures lose in the output, as far as it is known before the run."""
+    path = Path(output.output)
+    if path.suffix.lower() not in SUFFIXES:
+        return []
+    encoding = chosen(path, video.codec, video.quality, video.encoder)
+    coding, lost = encoding.coding(reader.coding)
+    form = VideoFormat(encoding, coding, reader.size, reader.rate, 1 / reader.rate, reader.facts)
+    return [*lost, *form.left_out]
+
+
 def check_output(output: OutputSettings, video: VideoSettings, source: str | Path) -> None:
     """InputError for an output that cannot be made of a video, before that is opened.
 

@@ -37,7 +37,7 @@ def blur_pipe(
             source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
             color_in=color_in, tell=console.say, progress=check,
         )  # fmt: skip
-    console.say(*report.left_out, *pictures_told(report, request.video.duplicates == "fill"))
+    console.say(*pictures_told(report, request.video.duplicates == "fill"))
     where = "stdout" if output.output == STDOUT else output.output
     console.say(f"{counted(report.frames, 'frame')} -> {where}")
     if report.loss:

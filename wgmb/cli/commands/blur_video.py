@@ -72,9 +72,11 @@ def tell_how(run: VideoRun, console: Console) -> None:
 
 def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
     """Blur a video, with lines about what was seen in it; the exit code."""
+    losses = plan.losses
+    console.say(*(f"{plan.name}: {text}" for text in losses))
     with console.progress(len(plan.wanted)) as tick:
         report = run(plan, _estimated(tick, len(plan.wanted), run, console))
-    console.say(*(f"{plan.name}: {text}" for text in report.left_out))
+    console.say(*(f"{plan.name}: {text}" for text in report.left_out if text not in losses))
     if report.is_new:
         console.say(*pictures_told(report, run.request.video.duplicates == "fill"))
         took = f"{report.seconds:.1f} s" + (f" with {report.method}" if report.method else "")
