@@ -3,15 +3,16 @@
 python tools/pass_log.py FOLDER [RUN ...]    FOLDER holds the inputs, which are made once
 
 A line each: file and entry point, constants, workgroups, and what is bound to each index of each
-group: of a uniform the checksum of its content, of a buffer and a texture its name and size; of
-those of 1 x 1, which stand for none, the format alone. Clears and copies have lines too. Two logs
-compare with `diff`.
+group: of a uniform, and of any buffer that Python filled, the checksum of its content; of others
+and of textures the name and the size. "-" is what may stand for none: textures of 1 x 1, and
+buffers of up to 256 bytes. Clears and copies have lines too. Two logs compare with `diff`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import io
 import shlex
 import sys
@@ -46,6 +47,7 @@ RUNS |= {
     "video": "blur clip8.mp4 -o r.mp4 --end 0.25",
     "perceived": "perceive sample -o r.#.png --fps 24 --frames 9-10",
 }
+SMALL = 256  # bytes
 _LINES: list[str] = []
 
 
@@ -80,18 +82,9 @@ def watch_all() -> None:
         constants = {name: float(value) for name, value in compute.get("constants", {}).items()}
         pipeline.told = f"{label} {sorted(constants.items())}"
 
-    def laid(layout, _device, *, entries, **_options):
-        layout.uniforms = {e["binding"] for e in entries
-                           if e.get("buffer", {}).get("type") == "uniform"}  # fmt: skip
-
-    def grouped(group, _device, *, layout, entries, **_options):
+    def grouped(group, _device, *, entries, **_options):
         things = sorted(entries, key=lambda entry: entry["binding"])
-        group.bound = [
-            (e["binding"] in getattr(layout, "uniforms", ()), e["resource"]) for e in things
-        ]
-
-    def begun(encoder, *_args, **_options):
-        encoder.groups = {}
+        group.bound = [entry["resource"] for entry in things]
 
     def set_pipeline(_none, encoder, pipeline):
         encoder.pipeline_told = getattr(pipeline, "told", pipeline.label)
@@ -100,13 +93,13 @@ def watch_all() -> None:
         encoder.__dict__.setdefault("bound", {})[index] = group
 
     def dispatched(_none, encoder, *counts):
-        where = [named(False, n) if isinstance(n, wgpu.GPUBuffer) else str(n) for n in counts]
+        where = [named(n) if isinstance(n, wgpu.GPUBuffer) else str(n) for n in counts]
         groups = encoder.__dict__.get("bound", {})
-        bound = [f"[{' '.join(named(*one) for one in groups[i].bound)}]" for i in sorted(groups)]
+        bound = [f"[{' '.join(map(named, groups[i].bound))}]" for i in sorted(groups)]
         _LINES.append(f"{encoder.pipeline_told} ({', '.join(where)}) {' '.join(bound)}")
 
     def cleared(_none, _encoder, buffer, *span):
-        _LINES.append(f"clear {named(False, buffer)} {span}")
+        _LINES.append(f"clear {named(buffer)} {span}")
 
     def copied(_none, _encoder, source, to, size):
         both = (f"{one['texture'].label}{one.get('origin', '')}" for one in (source, to))
@@ -115,7 +108,6 @@ def watch_all() -> None:
     watch(wgpu.GPUDevice, "create_buffer_with_data", made)
     watch(_api.GPUQueue, "write_buffer", written)
     watch(_api.GPUDevice, "create_compute_pipeline", compiled)
-    watch(_api.GPUDevice, "create_bind_group_layout", laid)
     watch(_api.GPUDevice, "create_bind_group", grouped)
     watch(_api.GPUComputePassEncoder, "set_pipeline", set_pipeline)
     watch(_api.GPUBindingCommandsMixin, "set_bind_group", set_group)
@@ -125,18 +117,19 @@ def watch_all() -> None:
     watch(_api.GPUCommandEncoder, "copy_texture_to_texture", copied)
 
 
-def named(is_uniform: bool, resource: Any) -> str:
+def named(resource: Any) -> str:
     """A resource as a word of a line."""
-    if isinstance(resource, dict):
-        buffer, span = resource["buffer"], f"{resource['offset']}+{resource['size']}"
-        return buffer.content if is_uniform else f"{buffer.label}:{span}"
-    if isinstance(resource, wgpu.GPUBuffer):
-        return f"{resource.label}:{getattr(resource, 'content', resource.size)}"
     if isinstance(resource, wgpu.GPUSampler):
         return "sampler"
+    if isinstance(resource, dict | wgpu.GPUBuffer):
+        part = resource if isinstance(resource, dict) else {"buffer": resource, "offset": 0}
+        buffer, size = part["buffer"], part.get("size", part["buffer"].size)
+        if content := getattr(buffer, "content", ""):
+            return content
+        return "-" if buffer.size <= SMALL else f"{buffer.label}:{part['offset']}+{size}"
     texture = resource.texture
     if texture.size == (1, 1, 1):
-        return texture.format
+        return "-"
     return f"{texture.label}:{texture.format}:{'x'.join(map(str, resource.size))}".replace(" ", "_")
 
 
@@ -150,6 +143,9 @@ def main() -> int:
     if not folder.exists():
         same_results.make_inputs(folder)
     watch_all()
+    importlib.import_module(
+        "wgmb.render"
+    )._BUSY = 1e9  # samples in portions that do not depend on the time
     with contextlib.chdir(folder):
         for name in sys.argv[2:] or [*RUNS, "viewer"]:
             _LINES.clear()

@@ -3,6 +3,7 @@
 import itertools
 import random
 import re
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -90,6 +91,124 @@ def test_python_and_gpu_agree_on_struct_layout(device, seed, folder):
     uniform = device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
     run(device, source, p=uniform, out=out)
     assert np.array_equal(np.frombuffer(device.queue.read_buffer(out), "<u4"), want)
+
+
+FIELDS = (
+    ONE + "struct Values {\n    a: f32,\n    b: vec3u,\n    c: array<vec4f, 2>,\n}\n"
+    "@group(1) @binding(0) var<uniform> p: Values;\n"
+    "@group(1) @binding(1) var<storage, read> q: array<u32>;\n"
+    "@group(1) @binding(2) var<storage, read_write> out: array<f32>;\n"
+    "@compute @workgroup_size(1)\nfn main() {\n"
+    "    let all = array(p.a, f32(p.b.x), f32(p.b.y), f32(p.b.z), p.c[0].x, p.c[0].w, p.c[1].x);\n"
+    "    for (var i = 0; i < 7; i++) { out[i] = all[i]; }\n    out[7] = f32(q[1]);\n}\n"
+)
+
+
+@dataclass
+class Values:
+    a: float
+    b: tuple[int, int]
+
+
+@pytest.mark.parametrize(
+    ("given", "want"),
+    [
+        ({}, [0, 0, 0, 0, 0, 0, 0]),
+        ({"a": 2.5, "b": (1, 2, 3)}, [2.5, 1, 2, 3, 0, 0, 0]),
+        ({"b": [7], "c": [(4, 0, 0, 5)]}, [0, 7, 0, 0, 4, 5, 0]),  # the first elements alone
+        (Values(1.5, (8, 9)), [1.5, 8, 9, 0, 0, 0, 0]),
+    ],
+)
+def test_a_uniform_is_made_of_its_fields_and_a_buffer_of_an_array(device, folder, given, want):
+    (folder / "fields.wgsl").write_text(FIELDS)
+    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+    out = device.create_buffer(size=32, usage=usage)
+    run(device, wgsl.load("fields.wgsl"), p=given, q=np.array([3, 6], np.uint32), out=out)
+    assert np.frombuffer(device.queue.read_buffer(out), "<f4").tolist() == [*want, 6]
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"d": 1}, r"p has the fields \['a', 'b', 'c'\], got \['d'\]"),
+        (np.zeros(1, np.float32), "p is .*, got float32"),
+        (3, "p has the fields .*, got 3"),
+    ],
+)
+def test_fields_that_a_struct_does_not_have_are_errors(device, folder, given, says):
+    (folder / "fields.wgsl").write_text(FIELDS)
+    with pytest.raises(ShaderError, match=f"fields.wgsl: {says}"):
+        run(device, wgsl.load("fields.wgsl"), p=given, q=None, out=None)
+
+
+def test_a_binding_that_is_nothing_of_a_gpu_is_an_error(device, folder):
+    (folder / "fields.wgsl").write_text(FIELDS)
+    with pytest.raises(ShaderError, match=r"fields\.wgsl: cannot bind str as q"):
+        run(device, wgsl.load("fields.wgsl"), p={}, q="none", out=None)
+
+
+KINDS = [
+    "var x: texture_2d<f32>", "var x: texture_2d<u32>", "var x: texture_2d_array<f32>",
+    "var x: texture_2d_array<u32>", "var x: texture_storage_2d<rgba16float, write>",
+    "var x: texture_storage_2d<r32uint, write>", "var<storage, read> x: array<vec4f>",
+    "var x: texture_storage_2d_array<rgba32float, write>", "var<storage, read_write> x: array<u32>",
+    "var<uniform> x: vec4f",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_none_is_bound_as_what_the_shader_declares(device, folder, kind):
+    def read(name):
+        if "storage," in kind:
+            return f"{name}[0]"
+        return name if "uniform" in kind else f"textureDimensions({name})"
+
+    other = kind.replace(" x", " y")
+    (folder / "kinds.wgsl").write_text(
+        f"{ONE}@group(1) @binding(0) {kind};\n@group(1) @binding(1) {other};\n"
+        "@group(1) @binding(2) var<storage, read_write> out: array<u32>;\n@compute "
+        f"@workgroup_size(1)\nfn main() {{\n    _ = {read('x')};\n    _ = {read('y')};\n"
+        "    out[0] = 5u;\n}\n"
+    )
+    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+    out = device.create_buffer(size=4, usage=usage)
+    source = wgsl.load("kinds.wgsl")
+    run(device, source, x=None, y=None, out=out)
+    assert np.frombuffer(device.queue.read_buffer(out), "<u4") == 5
+    kernel, frame = gpu.Kernel(device, source), gpu.FrameBindings((1, 1), {})
+    first, second = (kernel.prepared("main", frame, x=None, y=None, out=out) for _ in range(2))
+    assert first.resources["x"] is second.resources["x"]  # kept, so that bind groups are too
+    shared = first.resources["x"] is first.resources["y"]
+    assert shared == (
+        "write" not in kind and "uniform" not in kind
+    )  # no pass writes one resource by two names
+
+
+def test_a_pass_may_be_recorded_again_and_runs_over_a_size(device, folder):
+    (folder / "count.wgsl").write_text(
+        "const WG_X: u32 = 4u;\nconst WG_Y: u32 = 2u;\n"
+        "@group(1) @binding(0) var<storage, read_write> out: array<atomic<u32>>;\n"
+        "@compute @workgroup_size(WG_X, WG_Y)\nfn main() { atomicAdd(&out[0], 1u); }\n"
+    )
+    usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
+    out = device.create_buffer(size=4, usage=usage)
+    kernel = gpu.Kernel(device, wgsl.load("count.wgsl"))
+    frame = gpu.FrameBindings((4, 2), {})
+    assert kernel.prepared("main", frame, out=out).workgroups == (1, 1)
+    again = kernel.prepared("main", frame, (9, 3), out=out)
+    assert again.workgroups == (3, 2)
+    for want in (48, 96):
+        encoder = device.create_command_encoder()
+        again.record(encoder)
+        gpu.submit(device, encoder)
+        assert np.frombuffer(device.queue.read_buffer(out), "<u4") == want
+    counts = device.create_buffer_with_data(
+        data=np.array([0, 2, 1, 1], np.uint32), usage=wgpu.BufferUsage.INDIRECT
+    )
+    encoder = device.create_command_encoder()
+    kernel.run(encoder, "main", frame, {"buffer": counts, "offset": 4, "size": 12}, out=out)
+    gpu.submit(device, encoder)
+    assert np.frombuffer(device.queue.read_buffer(out), "<u4") == 96 + 16
 
 
 @pytest.mark.parametrize("file", ENTERED)

@@ -71,7 +71,7 @@ class Recorder:
                 (type(device.queue), "write_texture", self._noted_upload),
                 (encoder, "clear_buffer", self._noted_clear),
                 (encoder, "copy_texture_to_texture", self._noted_copy),
-                (kernels.Kernel, "run", self._noted_run),
+                (kernels.Pass, "record", self._noted_pass),
             ):
                 stack.enter_context(_watched(owner, name, note))
             yield
@@ -102,18 +102,19 @@ class Recorder:
                 for e in (source, destination)]  # fmt: skip
         self.passes.append({"copy": ends, "size": list(size)})
 
-    def _noted_run(self, made, kernel, encoder, entry, bindings, groups=None, /, **own) -> None:
-        resources = bindings.resources | own
+    def _noted_pass(self, made, one: kernels.Pass, encoder) -> None:
         row: dict[str, Any] = {
-            "kernel": _kernel(kernel),
-            "entry": entry,
-            "resources": {name: self._resource(resources[name]) for name in kernel.bindings},
+            "kernel": _kernel(one.kernel),
+            "entry": one.entry,
+            "resources": {
+                name: self._resource(one.resources[name]) for name in one.kernel.bindings
+            },
         }
-        if groups:
-            row["indirect"] = {"buffer": self._buffer(groups["buffer"]), "offset": groups["offset"]}
+        if isinstance(one.workgroups, tuple):
+            row["workgroups"] = list(one.workgroups)
         else:
-            sizes = zip(bindings.size, kernel.workgroup, strict=True)
-            row["workgroups"] = [-(-n // edge) for n, edge in sizes]
+            buffer, offset = (one.workgroups[name] for name in ("buffer", "offset"))
+            row["indirect"] = {"buffer": self._buffer(buffer), "offset": offset}
         self.passes.append(row)
 
     def _resource(self, resource) -> dict[str, Any]:

@@ -16,14 +16,16 @@ from .device import (
     texel,
     translated,
 )
-from .kernels import FrameBindings, Kernel, kernel, stored, uniform
+from .kernels import BufferPart, FrameBindings, Kernel, Pass, kernel, stored, uniform
 from .priority import lower_priority, yielding
 
 __all__ = [
     "SOFTWARE",
     "BindGroups",
+    "BufferPart",
     "FrameBindings",
     "Kernel",
+    "Pass",
     "adapters",
     "borrow_device",
     "check_size",

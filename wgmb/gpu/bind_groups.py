@@ -1,16 +1,20 @@
-"""Bind groups and constant buffers that are kept from frame to frame: making one costs 20 us."""
+"""Bind groups, constants and stand-ins, kept from frame to frame: making one costs 20 us."""
 
 from __future__ import annotations
 
+import re
 import weakref
 from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import wgpu
 
-Resource = wgpu.GPUTextureView | wgpu.GPUSampler | wgpu.GPUBuffer | Mapping
+Resource = wgpu.GPUTextureView | wgpu.GPUSampler | wgpu.GPUBuffer | Mapping[str, Any]
+_Key = tuple[object, ...]
 _LARGEST = 4096  # bytes of a constant that is kept
+_NOTHING = 256  # bytes of a buffer that stands for none
 
 
 class BindGroups:
@@ -19,9 +23,9 @@ class BindGroups:
     """
 
     def __init__(self) -> None:
-        self._groups: dict[tuple, tuple[wgpu.GPUBindGroup, set[int]]] = {}  # and uids of its things
-        self._keys: dict[int, set[tuple]] = {}  # of the groups that bind a thing, by its uid
-        self._watched: dict[int, weakref.ref] = {}
+        self._groups: dict[_Key, tuple[wgpu.GPUBindGroup, set[int]]] = {}  # and uids of its things
+        self._keys: dict[int, set[_Key]] = {}  # of the groups that bind a thing, by its uid
+        self._watched: dict[int, weakref.ref[wgpu.GPUObjectBase]] = {}
 
     def __len__(self) -> int:
         return len(self._groups)
@@ -44,14 +48,14 @@ class BindGroups:
             self._watch(thing, key)
         return made
 
-    def _watch(self, thing: wgpu.GPUObjectBase, key: tuple) -> None:
+    def _watch(self, thing: wgpu.GPUObjectBase, key: _Key) -> None:
         """Forget the group `key` when `thing` goes."""
         uid = thing.uid
         self._keys.setdefault(uid, set()).add(key)
         if uid not in self._watched:
             me = weakref.ref(self)
 
-            def gone(_ref: weakref.ref) -> None:
+            def gone(_ref: weakref.ref[wgpu.GPUObjectBase]) -> None:
                 groups = me()
                 if groups is not None:
                     groups._forget(uid)
@@ -110,6 +114,31 @@ def _constant(device: wgpu.GPUDevice, label: str, data: bytes, usage: int) -> wg
     return device.create_buffer_with_data(label=label, data=data, usage=usage)
 
 
+def stand_in(device: wgpu.GPUDevice, name: str, space: str, kind: str) -> Resource:
+    """Bound where a pass has nothing for the binding `name`, of this address space and type.
+
+    A texture of one black pixel, or a buffer of zeros. Those that are written are the binding's
+    own, as a pass may not write one resource by two names.
+    """
+    written = "write" in space or "write" in kind
+    return _stand_in(device, name if written else "", space, kind)
+
+
+@lru_cache(maxsize=256)
+def _stand_in(device: wgpu.GPUDevice, name: str, space: str, kind: str) -> Resource:
+    if space.startswith("storage"):
+        usage = wgpu.BufferUsage.STORAGE
+        return device.create_buffer(label=f"none {name}", size=_NOTHING, usage=usage)
+    stored = re.search(r"texture_storage_2d(?:_array)?<(\w+)", kind)
+    format = stored[1] if stored else "r32uint" if "<u32>" in kind else "rgba16float"
+    usage = wgpu.TextureUsage.STORAGE_BINDING if stored else wgpu.TextureUsage.TEXTURE_BINDING
+    texture = device.create_texture(
+        label=f"none {name}", size=(1, 1, 1), format=format, usage=usage
+    )
+    return texture.create_view(dimension="2d-array" if "_2d_array" in kind else "2d")
+
+
 def forget_constants() -> None:
-    """Let go of all constants: their device is lost."""
+    """Let go of all constants and stand-ins: their device is lost."""
     _constant.cache_clear()
+    _stand_in.cache_clear()

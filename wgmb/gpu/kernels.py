@@ -1,10 +1,15 @@
-"""Kernels: one compiled WGSL file each, its passes recorded by the names of its bindings."""
+"""Kernels: one compiled WGSL file each, its passes recorded by the names of its bindings.
+
+A caller says what a pass reads and writes; the kernel makes what its WGSL declares: uniforms from
+their fields, buffers from arrays, stand-ins for None, and workgroups from a size. `Kernel.prepared`
+is where every dispatch of wgmb passes through, as a `Pass` that can be recorded more than once.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, is_dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +19,14 @@ import wgpu
 
 from ..errors import ShaderError
 from . import wgsl
-from .bind_groups import BindGroups, constant, forget_constants, made_group
+from .bind_groups import BindGroups, Resource, constant, forget_constants, made_group, stand_in
+
+Size = tuple[int, int]
+BufferPart = dict[str, Any]
+"""A part of a buffer: "buffer", "offset" and "size" [bytes], as wgpu takes it."""
+Texels = Mapping[str, Any]
+"""Formats by the aliases of a file, and what will be bound by the names of its bindings."""
+_MADE = wgpu.GPUTextureView, wgpu.GPUBuffer, wgpu.GPUSampler
 
 
 @dataclass(frozen=True)
@@ -34,17 +46,42 @@ class FrameBindings:
 
 def uniform(device: wgpu.GPUDevice, file: str, struct: str, **values: Any) -> wgpu.GPUBuffer:
     """A struct of a file in `wgsl/` as a uniform buffer, with these values, the others 0."""
-    data = np.zeros((), wgsl.load(file).dtype(struct))
-    for name, value in values.items():
-        data[name] = value
-    return constant(device, struct, data)
+    return constant(device, struct, wgsl.filled(wgsl.load(file).dtype(struct), values))
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One dispatch and all that it binds: it may be recorded again, as long as these stay."""
+
+    kernel: Kernel
+    entry: str
+    resources: Mapping[str, Resource]
+    """By the names of the bindings, all groups together."""
+    groups: tuple[wgpu.GPUBindGroup, ...]
+    workgroups: Size | BufferPart
+    """Their number across and down; or the part of a buffer that holds it."""
+
+    def record(self, encoder: wgpu.GPUCommandEncoder) -> None:
+        """Record it."""
+        pipeline = self.kernel.pipeline(self.entry)
+        compute = encoder.begin_compute_pass(label=pipeline.label)
+        compute.set_pipeline(pipeline)
+        for index, group in enumerate(self.groups):
+            compute.set_bind_group(index, group)
+        if isinstance(self.workgroups, tuple):
+            compute.dispatch_workgroups(*self.workgroups)
+        else:
+            compute.dispatch_workgroups_indirect(
+                self.workgroups["buffer"], self.workgroups["offset"]
+            )
+        compute.end()
 
 
 class Kernel:
     """All entry points of one WGSL file, sharing the same bind groups.
 
-    `kernel.run(encoder, "main", given, color=..., output=...)` binds by the names
-    used in the shader; a missing or unknown name is an error before any GPU work.
+    `kernel.run(encoder, "main", bindings, color=..., output=...)` binds by the names used in the
+    shader; a missing or unknown name is an error before any GPU work.
     """
 
     def __init__(
@@ -55,7 +92,7 @@ class Kernel:
     ):
         self.device, self.source, self.constants = device, source, constants or {}
         self.bindings = {b.name: b for b in source.bindings()}
-        self.workgroup = int(source.constant("WG_X")), int(source.constant("WG_Y"))
+        self.workgroup = source.integer("WG_X"), source.integer("WG_Y")
         try:
             self._module = _module(device, source.name, source.text)
         except wgpu.GPUError as error:
@@ -72,6 +109,9 @@ class Kernel:
             for group in self.groups
         ]
         self._layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
+        self._structs = {
+            b.name: source.dtype(b.type) for b in self.bindings.values() if b.space == "uniform"
+        }
         self._pipelines: dict[str, wgpu.GPUComputePipeline] = {}
         self._places = [
             {b.name: b.index for b in self.bindings.values() if b.group == group}
@@ -95,48 +135,88 @@ class Kernel:
             )
         return self._pipelines[entry]
 
-    def bands(self, bindings: FrameBindings, most: int) -> Iterator[tuple[int, FrameBindings]]:
-        """The image as bands of whole rows, of about `most` pixels each.
+    def bands(self, size: Size, most: int) -> Iterator[tuple[int, Size]]:
+        """An image of `size` as bands of whole rows, of about `most` pixels each.
 
-        Yields the first row of each [px], and what a dispatch over it is run with. Without a GPU,
-        a dispatch is not interrupted, and takes seconds for a large image.
+        Yields the first row of each [px], and the size of a dispatch over it. Without a GPU, a
+        dispatch is not interrupted, and takes seconds for a large image.
         """
-        (width, height), edge = bindings.size, self.workgroup[1]
+        (width, height), edge = size, self.workgroup[1]
         rows = max(most // (width * edge), 1) * edge
         for top in range(0, height, rows):
-            yield top, replace(bindings, size=(width, min(rows, height - top)))
+            yield top, (width, min(rows, height - top))
 
     def run(
         self,
-        encoder,
+        encoder: wgpu.GPUCommandEncoder,
         entry: str,
         bindings: FrameBindings,
-        groups: dict | None = None,
+        over: Size | BufferPart | None = None,
         /,
-        **resources,
+        **resources: Any,
     ) -> None:
-        """Record one dispatch over the image: group 0 from `bindings`, group 1 from `resources`.
+        """Record one dispatch: group 0 from `bindings`, group 1 from `resources`.
 
-        `groups`: the part of a buffer that holds how many workgroups it takes instead.
+        `over`: invocations across and down, by default those of the image; or the part of a buffer
+        that holds how many workgroups there are. A uniform may be the fields of its struct, as a
+        mapping or a dataclass: those that are not named are 0, as are the last elements of a vector
+        or an array that is given fewer. A storage buffer may be an array. None: a black texture of
+        one pixel, or a buffer of zeros, that the pass does not use.
         """
+        self.prepared(entry, bindings, over, **resources).record(encoder)
+
+    def prepared(
+        self,
+        entry: str,
+        bindings: FrameBindings,
+        over: Size | BufferPart | None = None,
+        /,
+        **resources: Any,
+    ) -> Pass:
+        """The same as a Pass, not recorded yet."""
         if resources.keys() != self._names:
             wanted, got = sorted(self._names), sorted(resources)
             raise ShaderError(f"{self.source.name} binds {wanted}, got {got}")
-        every = bindings.resources | resources
+        every: dict[str, Resource] = dict(bindings.resources)
+        for name, value in resources.items():
+            every[name] = value if isinstance(value, _MADE) else self._resource(name, value)
         make = made_group if bindings.groups is None else bindings.groups.group
-        pipeline = self.pipeline(entry)
-        compute = encoder.begin_compute_pass(label=pipeline.label)
-        compute.set_pipeline(pipeline)
-        for group, layout in zip(self.groups, self.layouts, strict=True):
-            bound = {index: every[name] for name, index in self._places[group].items()}
-            compute.set_bind_group(group, make(self.device, layout, bound))
-        if groups:
-            compute.dispatch_workgroups_indirect(groups["buffer"], groups["offset"])
-        else:
-            compute.dispatch_workgroups(
-                *(-(-n // edge) for n, edge in zip(bindings.size, self.workgroup, strict=True))
-            )
-        compute.end()
+        groups = tuple(
+            make(self.device, layout, {index: every[name] for name, index in places.items()})
+            for layout, places in zip(self.layouts, self._places, strict=True)
+        )
+        if over is None or isinstance(over, tuple):
+            across, down = over or bindings.size
+            edges = self.workgroup
+            over = -(-across // edges[0]), -(-down // edges[1])
+        return Pass(self, entry, every, groups, over)
+
+    def _resource(self, name: str, value: Any) -> Resource:
+        """The resource that stands for a value."""
+        binding = self.bindings[name]
+        if binding.space == "uniform":
+            return constant(self.device, name, self._struct(name, {} if value is None else value))
+        if value is None:
+            return stand_in(self.device, name, binding.space, binding.type)
+        if isinstance(value, np.ndarray) and binding.space.startswith("storage"):
+            return constant(self.device, name, value, wgpu.BufferUsage.STORAGE)
+        if isinstance(value, Mapping) and "buffer" in value:
+            return value
+        raise ShaderError(f"{self.source.name}: cannot bind {type(value).__name__} as {name}")
+
+    def _struct(self, name: str, value: Any) -> np.ndarray:
+        """The struct of a uniform from its fields, or as it is."""
+        dtype = self._structs[name]
+        if isinstance(value, np.ndarray):
+            if value.dtype != dtype.base or value.nbytes != dtype.itemsize:
+                raise ShaderError(f"{self.source.name}: {name} is {dtype}, got {value.dtype}")
+            return value
+        fields = vars(value) if is_dataclass(value) else value
+        if not isinstance(fields, Mapping) or not fields.keys() <= set(dtype.names or ()):
+            wanted = list(dtype.names or ())
+            got = sorted(fields) if isinstance(fields, Mapping) else fields
+            raise ShaderError(f"{self.source.name}: {name} has the fields {wanted}, got {got}")
+        return wgsl.filled(dtype, fields)
 
 
 @lru_cache(maxsize=128)
@@ -145,7 +225,12 @@ def _module(device: wgpu.GPUDevice, name: str, text: str) -> wgpu.GPUShaderModul
 
 
 @lru_cache(maxsize=256)
-def _kernel(device, file: str, texels: tuple, constants: tuple) -> Kernel:
+def _kernel(
+    device: wgpu.GPUDevice,
+    file: str,
+    texels: tuple[tuple[str, str], ...],
+    constants: tuple[tuple[str, float], ...],
+) -> Kernel:
     source = wgsl.load(file).with_texels(**dict(texels))
     if reads_storage(device):
         source = source.reading_storage(device.limits["max-storage-textures-per-shader-stage"])
@@ -162,23 +247,36 @@ def reads_storage(device: wgpu.GPUDevice) -> bool:
 
 
 def kernel(
-    device, file: str | Path, texels: dict[str, str] | None = None, **constants: float
+    device: wgpu.GPUDevice,
+    file: str | Path,
+    texels: Texels | None = None,
+    **constants: float,
 ) -> Kernel:
     """The compiled kernel of `wgsl/<file>`, kept for the next time it is asked for.
 
     `file`: also the absolute path of a shader elsewhere, which may include those of wgsl/ too.
 
-    `texels` are the storage texel formats (`Output`), `constants` the overrides.
+    `texels`: the storage texel formats (`Output`); also what will be bound, as the format of a
+    texture that is "stored as given" is that of its binding. `constants`: the overrides.
     """
-    formats = tuple(sorted((texels or {}).items()))
-    return _kernel(device, str(file), formats, tuple(sorted(constants.items())))
+    formats = []
+    if texels:
+        flexible = wgsl.load(str(file)).flexible()
+        for name, texel in sorted(texels.items()):
+            if isinstance(texel, str):
+                formats.append((name, texel))
+            elif name in flexible:
+                formats.append((name, stored(texel)))
+    return _kernel(device, str(file), tuple(formats), tuple(sorted(constants.items())))
 
 
-def stored(view: wgpu.GPUTextureView) -> str:
+def stored(view: wgpu.GPUTextureView | None) -> str:
     """Texel format as which shaders may read the texture of `view` from storage, for `texels`.
 
     "given": it cannot be, as a caller's own texture need not be made for it.
     """
+    if view is None:
+        return "given"
     texture = view.texture
     storable = bool(texture.usage & wgpu.TextureUsage.STORAGE_BINDING)
     return texture.format if storable and texture.mip_level_count == 1 else "given"
@@ -196,7 +294,7 @@ def _located(message: str, source: wgsl.WgslSource) -> str:
     return re.sub(r"wgsl:(\d+):(\d+)", lambda m: f"{source.where(int(m[1]))}:{m[2]}", message)
 
 
-def _layout_entry(b: wgsl.Binding, source: wgsl.WgslSource) -> dict:
+def _layout_entry(b: wgsl.Binding, source: wgsl.WgslSource) -> dict[str, Any]:
     entry = {"binding": b.index, "visibility": wgpu.ShaderStage.COMPUTE}
     if b.space == "uniform":
         size = source.dtype(b.type).itemsize

@@ -83,7 +83,8 @@ class TexturePool:
     def __init__(self, device: wgpu.GPUDevice):
         self.device = device
         self._textures: dict[str, wgpu.GPUTexture] = {}
-        self._views: dict[str, dict[tuple, wgpu.GPUTextureView]] = {}  # by the texture's name
+        # By the texture's name, and by the view's options.
+        self._views: dict[str, dict[tuple[object, ...], wgpu.GPUTextureView]] = {}
         self._staging: wgpu.GPUBuffer | None = None
         in_software = device.adapter_info["adapter_type"] == SOFTWARE
         self._at_once = _READBACK_IN_SOFTWARE if in_software else _READBACK
@@ -127,7 +128,7 @@ class TexturePool:
         write(self.device, texture, image)
         return self.view_of(texture)
 
-    def download(self, encoder, texture: wgpu.GPUTexture) -> np.ndarray:
+    def download(self, encoder: wgpu.GPUCommandEncoder, texture: wgpu.GPUTexture) -> np.ndarray:
         """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
         width, height, _ = texture.size
         kind, channels = numpy_of(texture.format)

@@ -67,11 +67,11 @@ class TimestampClock(_Clock):
         hardware = device.adapter_info["adapter_type"] != SOFTWARE
         return hardware and "timestamp-query" in device.features
 
-    def watch(self, encoder) -> Any:
+    def watch(self, encoder: wgpu.GPUCommandEncoder) -> Any:
         """`encoder`, whose compute passes will write their times."""
         return _Stamped(self, encoder)
 
-    def of(self, label: str) -> dict:
+    def of(self, label: str) -> dict[str, Any]:
         """Return arguments of begin_compute_pass that make the pass `label` write its times."""
         first = 2 * len(self.labels)
         if len(self.labels) >= self.MOST:
@@ -100,7 +100,7 @@ class TimestampClock(_Clock):
 class _Stamped:
     """An encoder whose compute passes write their times."""
 
-    def __init__(self, clock: TimestampClock, encoder):
+    def __init__(self, clock: TimestampClock, encoder: wgpu.GPUCommandEncoder):
         self._clock, self._encoder = clock, encoder
 
     def __getattr__(self, name: str):
@@ -126,18 +126,18 @@ class WallClock(_Clock):
         self._took: list[float] = []
         self.empty = self._run(device.create_command_encoder())
 
-    def watch(self, encoder) -> Any:
+    def watch(self, encoder: wgpu.GPUCommandEncoder) -> Any:
         """Return a replacement for `encoder` that submits every command separately."""
         return _OneByOne(self)
 
-    def take(self, label: str, encoder) -> None:
+    def take(self, label: str, encoder: wgpu.GPUCommandEncoder) -> None:
         """Submit the one pass in `encoder`, and time it."""
         empty = self._run(self.device.create_command_encoder())  # waits for all that came before
         self.empty = min(self.empty, empty)
         self._took.append(self._run(encoder))
         self.labels.append(label)
 
-    def _run(self, encoder) -> float:
+    def _run(self, encoder: wgpu.GPUCommandEncoder) -> float:
         started = time.perf_counter()
         submit(self.device, encoder)
         self.device.queue.read_buffer(self._token)  # waits
@@ -158,12 +158,16 @@ class _OneByOne:
         self._clock.check()  # to compile its kernel may have taken long
         return _Alone(self._clock, label)
 
-    def clear_buffer(self, buffer, offset: int = 0, size: int | None = None) -> None:
+    def clear_buffer(
+        self, buffer: wgpu.GPUBuffer, offset: int = 0, size: int | None = None
+    ) -> None:
         encoder = self._clock.device.create_command_encoder()
         encoder.clear_buffer(buffer, offset, size)
         submit(self._clock.device, encoder)
 
-    def copy_texture_to_texture(self, source, destination, size) -> None:
+    def copy_texture_to_texture(
+        self, source: dict[str, Any], destination: dict[str, Any], size: tuple[int, int, int]
+    ) -> None:
         encoder = self._clock.device.create_command_encoder()
         encoder.copy_texture_to_texture(source, destination, size)
         submit(self._clock.device, encoder)

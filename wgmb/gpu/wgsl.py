@@ -10,9 +10,11 @@ of those. Anything else (@size, @align, f16, mat3x3) raises, it is not guessed.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +62,10 @@ class WgslSource:
             raise ShaderError(f"no constant {name} in {self.name}")
         return value
 
+    def integer(self, name: str) -> int:
+        """The same of a constant that counts."""
+        return int(self.constant(name))
+
     def dtype(self, name: str) -> np.dtype:
         """The numpy dtype with exactly the layout the GPU gives struct `name`."""
         return layout(name, self.text)[0]
@@ -72,6 +78,18 @@ class WgslSource:
             Binding(int(g), int(b), name, space, alias.get(kind, kind))
             for g, b, space, name, kind in re.findall(pattern, self.text, re.M)
         ]
+
+    def names(self) -> frozenset[str]:
+        """Names of the bindings."""
+        return _names(self.text)[0]
+
+    def overrides(self) -> frozenset[str]:
+        """Names of the constants that are set when a pass is compiled."""
+        return _names(self.text)[1]
+
+    def flexible(self) -> frozenset[str]:
+        """Bindings that are "stored as given": their format is that of what is bound."""
+        return _names(self.text)[2]
 
     def entry_points(self) -> list[str]:
         """Names of the compute entry points."""
@@ -101,7 +119,7 @@ class WgslSource:
         marks = list(re.finditer(pattern, self.text))[: max(most - written, 0)]
         read = {mark[2] for mark in marks}
 
-        def declared(mark: re.Match) -> str:
+        def declared(mark: re.Match[str]) -> str:
             if mark[2] not in read:
                 return mark[0]
             return f"{mark[1]}texture_storage_{mark[3]}<{mark[5]}, read>{mark[4]}{mark[5]}"
@@ -110,6 +128,28 @@ class WgslSource:
         for name in read:
             text = re.sub(rf"(textureLoad\({name}(?:, [\w.]+)+), 0\)", r"\1)", text)
         return WgslSource(text, self.files, self)
+
+
+def filled(dtype: np.dtype, values: Mapping[str, Any]) -> np.ndarray:
+    """A struct with these values, all else 0; of vectors and arrays, the first elements may do."""
+    data = np.zeros((), dtype)
+    for name, value in values.items():
+        field = data[name]
+        if field.ndim and np.ndim(value) and len(value) < len(field):
+            field[: len(value)] = value
+        else:
+            data[name] = value
+    return data
+
+
+@cache
+def _names(text: str) -> tuple[frozenset[str], frozenset[str], frozenset[str]]:
+    """Names of bindings, of overrides, and of bindings that are stored as given."""
+    return (
+        frozenset(re.findall(r"^@group\(\d+\).* var(?:<[^>]*>)? (\w+)\s*:", text, re.M)),
+        frozenset(re.findall(r"^override (\w+)", text, re.M)),
+        frozenset(re.findall(r"var (\w+): .*// stored as given", text)),
+    )
 
 
 @cache

@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-import numpy as np
 import wgpu
 
 from .. import gpu
 from ..camera import Window
-from ..gpu import wgsl
 from ..shutter import Shutter
 
 AUTO_STRATA = 256
@@ -39,18 +38,18 @@ class FrameConstants:
 
     def expose(self, shutter: Shutter) -> None:
         """Take the shutter of the frames from now on."""
-        data = np.zeros((), wgsl.load("common/shutter.wgsl").dtype("Shutter"))
         opens, closes = shutter.span
-        data["span"] = opens, closes
-        data["step"] = (closes - opens) / self._samples
-        data["rolling"] = shutter.delay
-        create = self._device.create_buffer_with_data
         self._shared = {
-            "shutter": create(label="shutter", data=data, usage=wgpu.BufferUsage.UNIFORM),
-            "strata": create(
-                label="strata",
-                data=shutter.strata(self._strata),
-                usage=wgpu.BufferUsage.STORAGE,
+            "shutter": gpu.uniform(
+                self._device,
+                "common/shutter.wgsl",
+                "Shutter",
+                span=(opens, closes),
+                step=(closes - opens) / self._samples,
+                rolling=shutter.delay,
+            ),
+            "strata": gpu.constant(
+                self._device, "strata", shutter.strata(self._strata), wgpu.BufferUsage.STORAGE
             ),
         }
         self._last: tuple[tuple[Any, ...], gpu.FrameBindings] | None = None
@@ -63,12 +62,18 @@ class FrameConstants:
         key = size, number, window
         if self._last is not None and self._last[0] == key:
             return self._last[1]
-        data = np.zeros((), wgsl.load("common/frame.wgsl").dtype("Frame"))
-        data["size"], data["samples"], data["jitter"] = size, self._samples, self._jitter
-        data["index"] = number % 2**32
-        data["origin"], data["display"] = window[:2], window[2:]
-        data["max_blur"] = np.inf if self._max_blur is None else self._max_blur
-        frame = gpu.constant(self._device, "frame", data)
+        frame = gpu.uniform(
+            self._device,
+            "common/frame.wgsl",
+            "Frame",
+            size=size,
+            samples=self._samples,
+            jitter=self._jitter,
+            index=number % 2**32,
+            origin=window[:2],
+            display=window[2:],
+            max_blur=math.inf if self._max_blur is None else self._max_blur,
+        )
         bound = gpu.FrameBindings(size, {"frame": frame, **self._shared}, window, self.groups)
         self._last = key, bound
         return bound

@@ -14,8 +14,8 @@ View = wgpu.GPUTextureView
 class HoldoutPass:
     """Records wgsl/gpu_frame/holdout.wgsl around a method; keeps the textures in between."""
 
-    def __init__(self, device: wgpu.GPUDevice, images: TexturePool, none: View):
-        self._device, self._images, self._none = device, images, none
+    def __init__(self, device: wgpu.GPUDevice, images: TexturePool):
+        self._device, self._images = device, images
         self._four = gpu.texel(device, 4)
         # One channel where it can be stored and filtered, four elsewhere.
         one = gpu.texel(device, 1)
@@ -23,54 +23,37 @@ class HoldoutPass:
 
     def before(
         self,
-        encoder,
+        encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
         color: View,
         holdout: View | None,
         which: str = "",
-    ):
+    ) -> tuple[View, View]:
         """The colour times its weight, and the weight, in textures of frame `which`."""
         weighted = self._images.view("weighted color" + which, bindings.size, self._four)
         weight = self._images.view("weight" + which, bindings.size, self._weight)
-        self._run(
-            "before",
-            encoder,
-            bindings,
-            color,
-            holdout,
-            self._none,
-            weight,
-            weighted,
-            self._four,
-        )
+        self._kernel(holdout, self._four).run(
+            encoder, "before", bindings,
+            color=color, holdout=holdout, blurred=None, weight=weight, output=weighted,
+        )  # fmt: skip
         return weighted, weight
 
     def after(
         self,
-        encoder,
-        bindings,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
         color: View,
         holdout: View | None,
-        blurred,
-        output,
+        blurred: View,
+        output: View,
         texel: str,
-    ):
-        """Record `output`, of format `texel`: the result, with what was held out put back."""
-        spare = self._images.view("spare", (1, 1), self._weight)
-        self._run("after", encoder, bindings, color, holdout, blurred, spare, output, texel)
-
-    def _run(
-        self, entry, encoder, bindings, color, holdout, blurred, weight, output, texel
     ) -> None:
+        """Record `output`, of format `texel`: the result, with what was held out put back."""
+        self._kernel(holdout, texel).run(
+            encoder, "after", bindings,
+            color=color, holdout=holdout, blurred=blurred, weight=None, output=output,
+        )  # fmt: skip
+
+    def _kernel(self, holdout: View | None, texel: str) -> gpu.Kernel:
         texels = {"Output": texel, "Weight": self._weight}
-        kernel = gpu.kernel(self._device, FILE, texels, HOLDOUT=holdout is not None)
-        kernel.run(
-            encoder,
-            entry,
-            bindings,
-            color=color,
-            holdout=holdout or self._none,
-            blurred=blurred,
-            weight=weight,
-            output=output,
-        )
+        return gpu.kernel(self._device, FILE, texels, HOLDOUT=holdout is not None)

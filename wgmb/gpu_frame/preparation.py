@@ -31,12 +31,12 @@ class PreparedFrame(FrameViews):
 class Preparation:
     """Records the passes before and after a method.
 
-    `none`: bound where there is no texture; `limited`: motion is clamped to the longest blur.
+    `limited`: motion is clamped to the longest blur.
     """
 
-    def __init__(self, images: TexturePool, velocity: VelocityPass, none: View, limited: bool):
+    def __init__(self, images: TexturePool, velocity: VelocityPass, limited: bool):
         self._images, self._velocity, self._limited = images, velocity, limited
-        self._holdout = HoldoutPass(images.device, images, none)
+        self._holdout = HoldoutPass(images.device, images)
 
     def encode_motion(
         self,

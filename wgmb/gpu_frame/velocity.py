@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -17,25 +18,25 @@ _BAND = 1 << 20  # pixels of a dispatch: a tenth of a second on two cores withou
 
 
 class VelocityPass:
-    """Records gpu_frame/velocity.wgsl; keeps two empty textures, and `in_place` a buffer.
+    """Records gpu_frame/velocity.wgsl; keeps a buffer if `in_place`.
 
     `in_place`: matrices are written into one buffer, so that its bind groups stay. Only for callers
     that submit each recording before they make the next one.
     """
 
-    def __init__(self, device: wgpu.GPUDevice, none: View, no_object: View):
-        self._device, self._none, self._no_object = device, none, no_object
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device = device
         self.in_place = False
         self._table: wgpu.GPUBuffer | None = None
 
     def encode(
         self,
-        encoder,
+        encoder: wgpu.GPUCommandEncoder,
         bindings: gpu.FrameBindings,
         frame: FrameViews,
         limited: bool,
         output: View,
-    ):
+    ) -> None:
         """Record `output` = to_prev, to_next [px] of every pixel."""
         paired = frame.motion is not None
         to_prev = frame.motion if paired else frame.to_prev
@@ -52,43 +53,38 @@ class VelocityPass:
             LIMITED=limited,
             ADDED=frame.object_motion,
         )
-        data, table, indices = self._matrices(bindings.size, frame.camera)
-        for top, band in kernel.bands(bindings, _BAND):
-            data["top"] = top
+        uniform, table, indices = self._matrices(bindings.size, frame.camera)
+        for top, band in kernel.bands(bindings.size, _BAND):
             kernel.run(
                 encoder,
                 "main",
+                bindings,
                 band,
-                velocity=gpu.constant(self._device, "velocity", data),
-                to_prev=to_prev or self._none,
-                to_next=frame.to_next or self._none,
-                depth=frame.depth or self._none,
-                object=frame.object_id or self._no_object,
-                scale=frame.scale or self._none,
+                velocity=uniform | {"top": top},
+                to_prev=to_prev,
+                to_next=frame.to_next,
+                depth=frame.depth,
+                object=frame.object_id,
+                scale=frame.scale,
                 reprojections=table,
                 indices=indices,
                 motion=output,
             )
 
-    def _matrices(self, size: tuple[int, int], camera: Reprojections | None):
-        source = wgsl.load(FILE)
-        data = np.zeros((), source.dtype("Velocity"))
-        table = np.zeros(1, source.dtype("Reprojection"))
-        indices = np.zeros(1, np.uint32)
-        if camera is not None:
-            matrices, indices = camera.matrices(), camera.indices
-            data["viewport"], data["bodies"] = viewport_of(camera, size), len(matrices)
-            table = np.zeros(len(matrices), source.dtype("Reprojection"))
-            # Row i of a matrix in numpy is column i in WGSL.
-            table["prev"] = matrices[:, 0].transpose(0, 2, 1)
-            table["next"] = matrices[:, 1].transpose(0, 2, 1)
-        storage = wgpu.BufferUsage.STORAGE
-        buffer = (
-            self._written(table)
-            if self.in_place and camera is not None
-            else gpu.constant(self._device, "reprojections", table, storage)
-        )
-        return data, buffer, gpu.constant(self._device, "indices", indices, storage)
+    def _matrices(
+        self, size: tuple[int, int], camera: Reprojections | None
+    ) -> tuple[dict[str, Any], np.ndarray | wgpu.GPUBuffer, np.ndarray]:
+        """Fields of the uniform, the matrices of all bodies, and the body of each object index."""
+        dtype = wgsl.load(FILE).dtype("Reprojection")
+        if camera is None:
+            return {}, np.zeros(1, dtype), np.zeros(1, np.uint32)
+        matrices = camera.matrices()
+        table = np.zeros(len(matrices), dtype)
+        # Row i of a matrix in numpy is column i in WGSL.
+        table["prev"] = matrices[:, 0].transpose(0, 2, 1)
+        table["next"] = matrices[:, 1].transpose(0, 2, 1)
+        uniform = {"viewport": viewport_of(camera, size), "bodies": len(matrices)}
+        return uniform, self._written(table) if self.in_place else table, camera.indices
 
     def _written(self, table: np.ndarray) -> wgpu.GPUBuffer:
         """The buffer that is written anew for every frame."""

@@ -40,12 +40,11 @@ class WeightedSum:
             begins = first == 0 and not onto
             shares = np.zeros(EIGHT, np.float32)
             shares[: len(views) - first] = weights[first : first + EIGHT]
-            share = gpu.uniform(self._device, file, "Share", weights=shares.reshape(2, 4))
             gpu.kernel(self._device, file, FIRST=begins).run(
                 encoder,
                 "main",
                 bindings,
-                share=share,
+                share={"weights": shares.reshape(2, 4)},
                 sums=self._sums.at_least(16 * width * height),
                 output=output.create_view(),
                 **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},

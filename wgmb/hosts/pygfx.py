@@ -167,7 +167,7 @@ class Bodies:
         self._device, self._renderer, self._scene = device, renderer, scene
         self._images = TexturePool(device)
         self._index: dict[int, int] = {}  # by id
-        self._table = np.zeros(int(wgsl.load(FILE).constant("IDS")), np.uint32)
+        self._table = np.zeros(wgsl.load(FILE).integer("IDS"), np.uint32)
         usage = wgpu.BufferUsage
         self._buffer = device.create_buffer_with_data(
             label="bodies", data=self._table, usage=usage.STORAGE | usage.COPY_DST

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import wgpu
 
 from .. import gpu
 from ..errors import InputError
 from ..gpu.textures import ScratchBuffer, TexturePool
+from .contract import Inputs, View
 from .options import MethodOptions
 
 
@@ -26,11 +26,13 @@ class Accumulate:
 
     Options = MethodOptions
 
-    def __init__(self, device, options: MethodOptions, *, output="rgba32float"):
+    def __init__(
+        self, device: wgpu.GPUDevice, options: MethodOptions, *, output: str = "rgba32float"
+    ):
         self._device, self._output = device, output
         self._sums, self._images = ScratchBuffer(device), TexturePool(device)
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the pictures of `inputs.progress`; `output` is the mean of all so far."""
         if inputs.shutter.rolling:
             raise InputError("method 'accumulate' renders whole images and cannot roll the shutter")
@@ -39,8 +41,6 @@ class Accumulate:
         width, height = inputs.bindings.size
         first, count = inputs.progress
         for i in range(first, first + count):
-            data = np.zeros((), kernel.source.dtype("Progress"))
-            data["done"] = i
             picture = inputs.scene.encode(
                 encoder, inputs.bindings, self._images, "accumulate", float(times[i])
             )
@@ -50,9 +50,7 @@ class Accumulate:
                 inputs.bindings,
                 color=picture["color"].create_view(),
                 sums=self._sums.at_least(16 * width * height),
-                progress=self._device.create_buffer_with_data(
-                    label="progress", data=data, usage=wgpu.BufferUsage.UNIFORM
-                ),
+                progress={"done": i},
                 output=output,
             )
 

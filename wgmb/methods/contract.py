@@ -30,14 +30,13 @@ class Inputs:
     shutter: Shutter
     frames: tuple[PreparedFrame, ...]
     """The frame itself, then those neighbours that there are; none for a scene."""
-    unbound: View
-    """Bound where an input is not there."""
     linear: wgpu.GPUSampler
     even: bool
     """The shutter is a box."""
     auto: bool
     """`samples` is the most a pixel may take."""
-    scene: SceneOnGpu | None
+    drawn: SceneOnGpu | None
+    """The scene, of methods that draw one."""
     progress: tuple[int, int]
     """Samples done before, samples to do now."""
 
@@ -55,6 +54,12 @@ class Inputs:
             late += abs(delay) * max(0.5, *ends)
         opens, closes = self.shutter.span
         return opens - late, closes + late
+
+    @property
+    def scene(self) -> SceneOnGpu:
+        """The scene that is drawn."""
+        assert self.drawn is not None, "the method needs a scene"
+        return self.drawn
 
     @property
     def frame(self) -> PreparedFrame:
@@ -121,8 +126,6 @@ class Method(Protocol):
 
     def __init__(self, device: wgpu.GPUDevice, options: MethodOptions, *, output: str): ...
 
-    def encode(
-        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: wgpu.GPUTextureView
-    ) -> None:
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record its passes; never submit, never wait."""
         ...

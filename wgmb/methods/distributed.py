@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-import numpy as np
 import wgpu
 
 from .. import gpu
 from ..gpu.textures import ScratchBuffer
+from ..shutter import Shutter
+from .contract import Inputs, View
 from .options import MethodOptions, Range
 
 TIMES = 4096  # equal shares of the exposure between which times are interpolated
@@ -36,12 +37,12 @@ class Distributed:
 
         seed: Annotated[int, Range(0, 2**32 - 1), "seed of the noise"] = 0
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         self._device, self._output, self._seed = device, output, options.seed
         self._sums = ScratchBuffer(device)
-        self._times: tuple[object, wgpu.GPUBuffer] | None = None
+        self._times: tuple[Shutter, wgpu.GPUBuffer] | None = None
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the rays of `inputs.progress`; `output` is the mean of all so far."""
         kernel = gpu.kernel(
             self._device,
@@ -49,28 +50,24 @@ class Distributed:
             {"Output": self._output},
             **inputs.scene.constants,
         )
-        data = np.zeros((), kernel.source.dtype("Progress"))
-        data["first"], data["count"] = inputs.progress
-        data["seed"] = self._seed
-        create = self._device.create_buffer_with_data
         width, height = inputs.bindings.size
+        first, count = inputs.progress
+        fine = inputs.bindings.resources | {"strata": self._fine(inputs.shutter)}
         kernel.run(
             encoder,
             "main",
-            replace(
-                inputs.bindings,
-                resources=inputs.bindings.resources | self._fine(inputs.shutter),
-            ),
-            progress=create(label="progress", data=data, usage=wgpu.BufferUsage.UNIFORM),
+            replace(inputs.bindings, resources=fine),
+            progress={"first": first, "count": count, "seed": self._seed},
             sums=self._sums.at_least(16 * width * height),
             output=output,
             **inputs.scene.resources,
         )
 
-    def _fine(self, shutter) -> dict:
+    def _fine(self, shutter: Shutter) -> wgpu.GPUBuffer:
+        """The times of the samples, in finer shares than other methods take."""
         if self._times is None or self._times[0] is not shutter:
             buffer = self._device.create_buffer_with_data(
                 label="times", data=shutter.strata(TIMES), usage=wgpu.BufferUsage.STORAGE
             )
             self._times = shutter, buffer
-        return {"strata": self._times[1]}
+        return self._times[1]

@@ -12,6 +12,7 @@ from .. import gpu
 from ..camera import Camera, Reprojections
 from ..extent import Spread
 from ..gpu.textures import TexturePool
+from .contract import Inputs, View
 from .options import MethodOptions, Range
 
 
@@ -79,7 +80,7 @@ class Fusion:
             "ratio of a sample's weight to the next newer one's; default 1, published 0.5",
         ] = None
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         self._device, self._output = device, output
         self._published = options.variant == "published"
         self._printed = options.weights == "published"
@@ -87,42 +88,44 @@ class Fusion:
         self._alphas = options.alpha_front, options.alpha_back
         self._images = TexturePool(device)
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the Gaussian's two passes, for weights too, and the fusion."""
         camera: Reprojections | None = inputs.frame.camera
         turned = camera is not None and camera.here.view_from_world is not None
-        weighted = inputs.frame.weight is not None
+        soft = self._filtered(encoder, inputs, inputs.frame.color, "color")
+        soft_weight = None
+        if inputs.frame.weight is not None:
+            soft_weight = self._filtered(encoder, inputs, inputs.frame.weight, "weight")
         kernel = gpu.kernel(
             self._device,
             "methods/fusion.wgsl",
             {"Output": self._output},
             BOX_SHUTTER=inputs.even,
             NORMALS=turned and inputs.frame.normal is not None,
-            WEIGHTED=weighted,
+            WEIGHTED=soft_weight is not None,
             PUBLISHED=self._published,
         )
-        data = np.zeros((), kernel.source.dtype("Fusion"))
-        data["facing"] = facing_of(camera, kernel.source.dtype("Facing"))
-        data["leading"], data["trailing"] = (self._shares(a, inputs.samples) for a in self._alphas)
         powers = self._tau ** np.arange(inputs.samples)
-        data["newest"], data["fading"] = 1 / powers.sum(), self._tau
-        data["middle"] = inputs.shutter.time(np.array(0.5))
+        leading, trailing = (self._shares(alpha, inputs.samples) for alpha in self._alphas)
         kernel.run(
             encoder,
             "main",
             inputs.bindings,
-            fusion=self._device.create_buffer_with_data(
-                label="fusion", data=data, usage=wgpu.BufferUsage.UNIFORM
-            ),
+            fusion={
+                "facing": facing_of(camera, kernel.source.dtype("Facing")),
+                "leading": leading,
+                "trailing": trailing,
+                "newest": 1 / powers.sum(),
+                "fading": self._tau,
+                "middle": inputs.shutter.time(np.array(0.5)),
+            },
             color=inputs.frame.color,
-            soft=self._filtered(encoder, inputs, inputs.frame.color, "color"),
+            soft=soft,
             motion=inputs.frame.motion,
             depth=inputs.frame.depth,
-            normal=inputs.frame.normal or inputs.unbound,
-            weight=inputs.frame.weight or inputs.unbound,
-            soft_weight=self._filtered(encoder, inputs, inputs.frame.weight, "weight")
-            if weighted
-            else inputs.unbound,
+            normal=inputs.frame.normal,
+            weight=inputs.frame.weight,
+            soft_weight=soft_weight,
             linear=inputs.linear,
             output=output,
         )
@@ -134,7 +137,9 @@ class Fusion:
         trail = min(self._alphas) / alpha
         return 1 - trail, trail
 
-    def _filtered(self, encoder, inputs, image, name: str) -> wgpu.GPUTextureView:
+    def _filtered(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, image: View, name: str
+    ) -> View:
         """The image through the Gaussian, along rows and then along columns."""
         texel = gpu.texel(self._device, 4)
         for down in (False, True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import wgpu
@@ -14,9 +14,12 @@ from ..errors import InputError
 from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
 from ..gpu_frame.velocity import viewport_of
+from .contract import Inputs, PreparedFrame, View
 from .five_positions import Bends
 from .options import MethodOptions
 
+Pair = tuple[Camera, Camera]
+"""The camera of a frame, and that towards which its samples go."""
 GOLDEN = (5**0.5 - 1) / 2
 AT_ONCE = 64 << 20  # bytes of depths, or links: how many slices, or steps, are done together
 
@@ -81,7 +84,7 @@ class Reproject:
                     "`depth_test` needs `splat='point'`, as a line has no single depth"
                 )
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         self._device, self._output, self._options = device, output, options
         self._nearest, self._winner = ScratchBuffer(device), ScratchBuffer(device)
         self._hits, self._open = ScratchBuffer(device), ScratchBuffer(device)
@@ -89,12 +92,12 @@ class Reproject:
         self._carries, self._links, self._heads = (ScratchBuffer(device) for _ in range(3))
         self._bends = Bends(device)
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record three passes a source for several slices, or two for several steps."""
         record = self._published if self._options.variant == "published" else self._slices
         record(encoder, inputs, output)
 
-    def _slices(self, encoder, inputs, output):
+    def _slices(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         sources = inputs.frames
         kernel = gpu.kernel(
             self._device,
@@ -105,14 +108,14 @@ class Reproject:
             COUNTS=self._options.show == "count",
             FIVE_POSITIONS=len(sources) > 1,
         )
-        bends = [self._bends.unbound]
+        bends: list[View | None] = [None]
         if len(sources) > 1:
-            bends = self._bends.encode(encoder, inputs, sources)
+            bends = [*self._bends.encode(encoder, inputs, sources)]
         width, height = inputs.bindings.size
         pixels = width * height
-        bits = int(kernel.source.constant("BLOCK_BITS"))
+        bits = kernel.source.integer("BLOCK_BITS")
         blocks = ((width >> bits) + 1) * ((height >> bits) + 1)
-        most = max(1, min(int(kernel.source.constant("SLICES")), AT_ONCE // (4 * pixels)))
+        most = max(1, min(kernel.source.integer("SLICES"), AT_ONCE // (4 * pixels)))
         most = min(most, inputs.samples)
         shared = {
             "own": inputs.frame.color,
@@ -128,20 +131,23 @@ class Reproject:
 
         def run(entry: str, source: int, first: int, count: int) -> None:
             frame = sources[source]
-            data = np.zeros((), kernel.source.dtype("Chunk"))
-            data["first"], data["count"], data["source"] = first, count, source
-            data["offset"] = frame.offset
             # All pixels share a slice's time, so jitter is the frame's: its next golden section.
-            data["shift"] = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
+            shift = inputs.jitter * (inputs.number * GOLDEN % 1 - 0.5)
             kernel.run(
                 encoder,
                 entry,
                 inputs.bindings,
-                chunk=gpu.constant(self._device, "chunk", data),
+                chunk={
+                    "first": first,
+                    "count": count,
+                    "source": source,
+                    "offset": frame.offset,
+                    "shift": shift,
+                },
                 color=frame.color,
                 motion=frame.motion,
                 depth=frame.depth,
-                weight=frame.weight or inputs.unbound,
+                weight=frame.weight,
                 bends=bends[source],
                 **shared,
             )
@@ -158,9 +164,9 @@ class Reproject:
                         run(entry, source, first, count)
         run("finish", 0, 0, 0)
 
-    def _published(self, encoder, inputs, output):
+    def _published(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         camera: Reprojections | None = inputs.frame.camera if inputs.frame.by_camera else None
-        pairs: list[tuple[Camera, Camera]] = []
+        pairs: list[Pair] = []
         if camera and camera.prev and camera.here.view_from_world is not None:
             pairs = [(camera.here, camera.prev), (camera.prev, camera.here)]
         if self._options.facing and not pairs:
@@ -184,7 +190,7 @@ class Reproject:
         )
         width, height = inputs.bindings.size
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
-        rows = int(kernel.source.constant("ROWS"))
+        rows = kernel.source.integer("ROWS")
         most = max(
             1,
             min(rows - 1, 2 ** (32 - bits[1]) - 2, AT_ONCE // (4 * width * height), inputs.samples),
@@ -200,34 +206,28 @@ class Reproject:
             "output": output,
         }
         encoder.clear_buffer(shared["heads"])
-        create = self._device.create_buffer_with_data
 
-        def run(entry: str, source, steps: np.ndarray, pair, first: bool, last: bool) -> None:
-            data = np.zeros((), kernel.source.dtype("Chunk"))
-            data["bits"], data["steps"] = bits, max(len(steps) - 1, 0)
-            data["first"], data["last"] = first, last
+        def run(
+            entry: str, source: PreparedFrame, steps: np.ndarray, pair: Pair | None,
+            first: bool, last: bool,
+        ) -> None:  # fmt: skip
+            chunk: dict[str, Any] = {"bits": bits, "steps": max(len(steps) - 1, 0)}
             table = np.zeros(rows, kernel.source.dtype("Step"))
             table["time"][: len(steps)] = steps
             if camera and pair:
-                seen = replace(camera, here=pair[0], prev=None, next=pair[1])
-                data["viewport"] = viewport_of(seen, inputs.bindings.size)
-                data["world_from_pixel"] = seen.world_from_pixel().T
-                data["eye"] = _eye(pair[0])
-                for row, share in zip(table, np.abs(steps), strict=False):
-                    between = pair[0].toward(pair[1], share)
-                    row["clip_from_pixel"] = replace(seen, next=between).matrices()[0, 1].T
-                    row["eye"] = _eye(between)
+                chunk |= _steps_between(replace(camera, here=pair[0], prev=None, next=pair[1]),
+                               inputs.bindings.size, np.abs(steps), table)  # fmt: skip
             kernel.run(
                 encoder,
                 entry,
                 inputs.bindings,
-                chunk=create(label="chunk", data=data, usage=wgpu.BufferUsage.UNIFORM),
-                steps=create(label="steps", data=table, usage=wgpu.BufferUsage.UNIFORM),
+                chunk=chunk | {"first": first, "last": last},
+                steps=table,
                 color=source.color,
                 motion=source.motion,
                 depth=source.depth,
-                normal=source.normal if self._options.facing and normals else inputs.unbound,
-                weight=source.weight or inputs.unbound,
+                normal=source.normal if self._options.facing and normals else None,
+                weight=source.weight,
                 **shared,
             )
 
@@ -248,6 +248,25 @@ class Reproject:
                 run("resolve", source, steps, pair, i == 0, i == len(jobs) - 1)
         if self._options.splat == "line":
             run("resolve", sources[0], shares[:0], None, False, True)
+
+
+def _steps_between(
+    cameras: Reprojections, size: tuple[int, int], shares: np.ndarray, table: np.ndarray
+) -> dict[str, Any]:
+    """Fields of a Chunk for the way from a camera to the next one; fills a row of `table` a share.
+
+    The Step of a share has the camera that is so far on the way.
+    """
+    assert cameras.next is not None
+    for row, share in zip(table, shares, strict=False):
+        between = cameras.here.toward(cameras.next, share)
+        row["clip_from_pixel"] = replace(cameras, next=between).matrices()[0, 1].T
+        row["eye"] = _eye(between)
+    return {
+        "viewport": viewport_of(cameras, size),
+        "world_from_pixel": cameras.world_from_pixel().T,
+        "eye": _eye(cameras.here),
+    }
 
 
 def _eye(camera: Camera) -> np.ndarray:

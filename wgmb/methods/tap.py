@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+import wgpu
+
 from .. import gpu
 from ..extent import Spread
 from ..gpu import wgsl
+from .contract import Inputs, View
 from .five_positions import Bends
 from .options import MethodOptions
 
@@ -46,7 +49,7 @@ class Tap:
             "taps over the exposure, or as in the chapter, ignoring the shutter",
         ] = "shutter"
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         self._device, self._output = device, output
         published = options.variant == "published"
         self._is_five = options.path == "five" and not published
@@ -56,12 +59,10 @@ class Tap:
         self._bends = Bends(device)
         self._constants = {"CURVED": options.path != "straight", "PUBLISHED": published}
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the one pass, after that for the paths through five positions."""
         five = self._is_five and len(inputs.frames) > 1
-        bends = self._bends.unbound
-        if five:
-            (bends,) = self._bends.encode(encoder, inputs, inputs.frames[:1])
+        bends = self._bends.encode(encoder, inputs, inputs.frames[:1])[0] if five else None
         kernel = gpu.kernel(
             self._device,
             "methods/tap.wgsl",
@@ -78,7 +79,7 @@ class Tap:
             inputs.bindings,
             color=inputs.frame.color,
             motion=inputs.frame.motion,
-            weight=inputs.frame.weight or inputs.unbound,
+            weight=inputs.frame.weight,
             linear=inputs.linear,
             bends=bends,
             output=output,

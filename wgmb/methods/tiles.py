@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
+import wgpu
 
 from .. import gpu
 from ..extent import Spread
 from ..gpu.textures import ScratchBuffer, TexturePool
+from .contract import Inputs, View
 from .options import MethodOptions
 
 LONGEST = (40, 9)  # blur to either side, and tile: so many pixels, or the height over this
@@ -54,7 +55,7 @@ class Tiles:
             Literal["color", "tiles"], "the blurred image, or the motion followed by each tile"
         ] = "color"
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         self._device, self._output, self._options = device, output, options
         self._images = TexturePool(device)
         self._row_max, self._tile_max, self._neighbor_max = (
@@ -66,7 +67,7 @@ class Tiles:
         """A tile is looked up as far as a quarter of its edge away, so that no seams show."""
         return -(-edge_of(height) // 4)
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record three passes over the tiles between two over the picture."""
         kernel = gpu.kernel(
             self._device,
@@ -86,24 +87,21 @@ class Tiles:
         edge = edge_of(display_height)
         first = left // edge, top // edge
         count = -(-(left + width) // edge) - first[0], -(-(top + height) // edge) - first[1]
-        data = np.zeros((), kernel.source.dtype("Tiles"))
-        data["count"], data["first"], data["edge"] = count, first, edge
-        tiles = gpu.constant(self._device, "tiles", data)
         velocity_depth = self._images.view("velocity, depth", (width, height), "rgba32float")
         velocity.run(
             encoder,
             "main",
             inputs.bindings,
             motion=inputs.frame.motion,
-            depth=inputs.frame.depth or inputs.unbound,
+            depth=inputs.frame.depth,
             velocity_depth=velocity_depth,
         )
         own = {
-            "tiles": tiles,
+            "tiles": {"count": count, "first": first, "edge": edge},
             "color": inputs.frame.color,
             "motion": inputs.frame.motion,
             "velocity_depth": velocity_depth,
-            "weight": inputs.frame.weight or inputs.unbound,
+            "weight": inputs.frame.weight,
             "linear": inputs.linear,
             "row_max": self._row_max.at_least(16 * count[0] * height),
             "tile_max": self._tile_max.at_least(16 * count[0] * count[1]),
@@ -117,4 +115,4 @@ class Tiles:
             "main": (width, height),
         }
         for entry, grid in grids.items():
-            kernel.run(encoder, entry, replace(inputs.bindings, size=grid), **own)
+            kernel.run(encoder, entry, inputs.bindings, grid, **own)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import wgpu
@@ -17,9 +16,11 @@ from ..scene.density import (
     overrides,
     tables,
 )
-from ..scene.figure import RATE
+from ..scene.figure import RATE, Figure
+from ..scene.gbuffer import SceneOnGpu
 from ..scene.volumes import Backdrop, OrbitingSphere, Torus
 from ..shutter import Shutter
+from .contract import Inputs, View
 from .options import MethodOptions
 
 CLOUD, SHADOW = 1, 2  # what can be in a tile
@@ -44,10 +45,12 @@ class Volume:
 
     Options = MethodOptions
 
-    def __init__(self, device, options: MethodOptions, *, output="rgba32float"):
+    def __init__(
+        self, device: wgpu.GPUDevice, options: MethodOptions, *, output: str = "rgba32float"
+    ):
         self._device, self._output = device, output
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record a pass for every kind of tile."""
         on_gpu, shutter = inputs.scene, inputs.shutter
         scene = on_gpu.original
@@ -62,7 +65,7 @@ class Volume:
         else:
             self._volumes(encoder, inputs, output)
 
-    def _volumes(self, encoder, inputs, output):
+    def _volumes(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         on_gpu, shutter = inputs.scene, inputs.shutter
         volumes, backdrop = on_gpu.original.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
@@ -81,14 +84,15 @@ class Volume:
         if len(volumes) > (most := source.constant("MOST_VOLUMES")):
             raise InputError(f"a scene has at most {most} volumes, got {len(volumes)}")
         data = _uniforms(on_gpu, shutter, backdrop, volumes, rotations)
+        tabled, usage = tables(shutter, rotations), wgpu.BufferUsage.STORAGE
         shared = {
-            "scene": self._uniform("volumes", data),
-            "tables": self._storage("tables", tables(shutter, rotations)),
+            "scene": data,
+            "tables": gpu.constant(self._device, "tables", tabled, usage),
             "output": output,
         }
-        edges = int(source.constant("WG_X")), int(source.constant("WG_Y"))
+        edges = source.integer("WG_X"), source.integer("WG_Y")
         kinds = tile_kinds(data, len(rotations), on_gpu.size, edges)
-        row = int(source.constant("TILES_A_ROW"))
+        row = source.integer("TILES_A_ROW")
         for kind in np.unique(kinds):
             cloud, shadow = bool(kind & CLOUD), bool(kind & SHADOW)
             kernel = gpu.kernel(
@@ -104,12 +108,15 @@ class Volume:
             kernel.run(
                 encoder,
                 "main",
-                replace(inputs.bindings, size=(groups[0] * edges[0], groups[1] * edges[1])),
-                tiles=self._storage("tiles", np.ascontiguousarray(at)),
+                inputs.bindings,
+                (groups[0] * edges[0], groups[1] * edges[1]),
+                tiles=np.ascontiguousarray(at),
                 **shared,
             )
 
-    def _figure(self, encoder, inputs, figure, output):
+    def _figure(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, figure: Figure, output: View
+    ) -> None:
         source = wgsl.load("scene/figure.wgsl")
         shutter, fps = inputs.shutter, inputs.scene.fps
         if figure.shutter is not None:
@@ -132,18 +139,10 @@ class Volume:
             encoder,
             "main",
             inputs.bindings,
-            figure=self._uniform("figure", data),
-            tables=self._storage("tables", tables(shutter, [rotation])),
+            figure=data,
+            tables=tables(shutter, [rotation]),
             output=output,
         )
-
-    def _uniform(self, label: str, data: np.ndarray) -> wgpu.GPUBuffer:
-        usage = wgpu.BufferUsage.UNIFORM
-        return self._device.create_buffer_with_data(label=label, data=data, usage=usage)
-
-    def _storage(self, label: str, data: np.ndarray) -> wgpu.GPUBuffer:
-        usage = wgpu.BufferUsage.STORAGE
-        return self._device.create_buffer_with_data(label=label, data=data, usage=usage)
 
 
 def volume_row(
@@ -199,7 +198,7 @@ def rotation_of(
 
 
 def _uniforms(
-    on_gpu,
+    on_gpu: SceneOnGpu,
     shutter: Shutter,
     backdrop: Backdrop,
     volumes: list[OrbitingSphere | Torus],
@@ -261,7 +260,14 @@ def tile_kinds(
     return CLOUD * seen + SHADOW * (shaded & any_down)
 
 
-def _meets(origin, direction, bounds, slabs, spread, wide=0.0) -> np.ndarray:
+def _meets(
+    origin: np.ndarray,
+    direction: np.ndarray,
+    bounds: np.ndarray,
+    slabs: np.ndarray,
+    spread: np.ndarray | float,
+    wide: np.ndarray | float = 0.0,
+) -> np.ndarray:
     """True where lines of unit direction, thickened, are in a bound's sphere and slab at once.
 
     They are `wide` at their origin and spread by the tangent `spread`.

@@ -113,11 +113,8 @@ class Blur:
         wanted = self.method.needs | self.method.uses
         self._residency = Residency(self._images, wanted, 2 * reach_of(self.method) + 1)
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
-        self._unbound = self._images.view("unbound", (1, 1), gpu.texel(self.device, 4))
-        no_object = self._images.view("no object", (1, 1), "r32uint")
-        self._velocity = VelocityPass(self.device, self._unbound, no_object)
-        limited = max_blur is not None
-        self._prepared = Preparation(self._images, self._velocity, self._unbound, limited)
+        self._velocity = VelocityPass(self.device)
+        self._prepared = Preparation(self._images, self._velocity, max_blur is not None)
         self.shutter = shutter_of(shutter, curve)
 
     def __repr__(self) -> str:
@@ -256,11 +253,10 @@ class Blur:
             jitter=self.jitter,
             shutter=self._shutter,
             frames=frames,
-            unbound=self._unbound,
             linear=self._linear,
             even=self._shutter.curve == "box",
             auto=self.auto,
-            scene=scene,
+            drawn=scene,
             progress=progress or (0, self.samples),
         )
 

@@ -82,4 +82,4 @@ def periodic_sum(integral: np.ndarray, turns: float) -> np.ndarray:
 
 
 def _shares() -> int:
-    return int(wgsl.load("scene/density.wgsl").constant("SHARES"))
+    return wgsl.load("scene/density.wgsl").integer("SHARES")

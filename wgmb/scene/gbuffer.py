@@ -45,7 +45,7 @@ class SceneOnGpu:
         source = wgsl.load("scene/trace.wgsl")
         # Of one ray and its shadow: both sift, then meet, all bodies.
         rings = sum(b.shape == "ring" for b in scene.bodies)
-        self.loops = 4 * n + n // 16 + 4 + 2 * rings * int(source.constant("RING_STEPS"))
+        self.loops = 4 * n + n // 16 + 4 + 2 * rings * source.integer("RING_STEPS")
         if n > (most := source.constant("MOST_BODIES")):
             raise InputError(f"a scene has at most {most} bodies, got {n}")
         self.antialias, self.span = antialias, span
@@ -177,9 +177,9 @@ class SceneOnGpu:
     ) -> None:
         """Record a kernel's dispatches, band by band."""
         resources, turns = self._instant(time), self.loops * self.antialias**2
-        for top, band in kernel.bands(bindings, _BAND // turns):
-            view = gpu.uniform(self.device, kernel.source.name, "View", top=top)
-            kernel.run(encoder, "main", band, view=view, **resources, **views)
+        for top, band in kernel.bands(bindings.size, _BAND // turns):
+            view = {"top": top}
+            kernel.run(encoder, "main", bindings, band, view=view, **resources, **views)
 
     def reprojections(self, time: float = 0.0) -> Reprojections:
         """Camera and body motion around `time` [frame intervals from this frame]."""

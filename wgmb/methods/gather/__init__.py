@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
+import wgpu
+
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
+from ..contract import Inputs, View
 from ..options import MethodOptions, Range
 from ..tap import Tap
 from .layers.layers import Layers
@@ -89,7 +92,7 @@ class Gather:
             "frames to search on either side: 1, or 2 for those beyond the neighbours too",
         ] = 1
 
-    def __init__(self, device, options: Options, *, output="rgba32float"):
+    def __init__(self, device: wgpu.GPUDevice, options: Options, *, output: str = "rgba32float"):
         images, confidence = TexturePool(device), options.show == "confidence"
         self._shading: Shading = options.shading
         self.reach = options.reach
@@ -103,7 +106,7 @@ class Gather:
         self._motions, self._scatter = TileMotions(device, images), Scatter(device)
         self._search = Search(device, images, confidence=confidence, output=output)
 
-    def encode(self, encoder, inputs, output):
+    def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record layers and tile motions of every frame, then the search."""
         size, frames = inputs.bindings.size, inputs.frames
         if self._taps is not None:

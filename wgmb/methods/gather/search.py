@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
-import numpy as np
 import wgpu
 
 from ... import gpu
-from ...gpu import wgsl
 from ...gpu.textures import ScratchBuffer, TexturePool
+from ..contract import Inputs, View
 from .shading import Added
-from .tiles.active_tiles import grid_of, uniform
+from .tiles.active_tiles import grid_of
 
 
 class Search:
@@ -23,84 +23,49 @@ class Search:
     ):
         self._device, self._images = device, images
         self._confidence, self._output = confidence, output
-        self._blocks, self._no_changes = ScratchBuffer(device), ScratchBuffer(device)
+        self._blocks = ScratchBuffer(device)
 
-    def encode(self, encoder, inputs, layers, starts, worklists, output, added: Added | None):
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        layers: Mapping[str, wgpu.GPUTexture],
+        starts: tuple[View, gpu.BufferPart],
+        worklists: Mapping[str, gpu.BufferPart],
+        output: View,
+        added: Added | None,
+    ) -> None:
         """Record the classification of blocks, then all pixels.
 
         The static cells of `worklists` are copied, if there are any.
         `starts`: of searches, the tiles' candidates and what is scattered. `added`: moving light.
         """
-        timed = {"BOX_SHUTTER": inputs.even, "ADAPTIVE": inputs.auto}
-        timed["FAR"] = any(abs(frame.offset) > 1 for frame in inputs.frames)
-        timed["WEIGHTED"] = inputs.frame.weight is not None
-        classify = gpu.kernel(
-            self._device,
-            "methods/gather/search/classify.wgsl",
-            MOVING_LIGHT=added is not None,
-            LIGHT_SCALE=added.scale if added else 1,
-            **timed,
-        )
-        data = np.zeros((), classify.source.dtype("SourceFrames"))
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
         far = [frame.offset for frame in inputs.frames[len(near) :]]
-        data["offsets"][: len(near)], data["far_offsets"][: len(far)] = near, far
-        data["count"], data["far_count"] = len(near), len(far)
-        candidates, scattered = starts
         array = partial(self._images.view_of, dimension="2d-array")
         arrays = {name: array(texture) for name, texture in layers.items()}
-        searched = {
-            "sources": uniform(self._device, "sources", data),
+        shared: dict[str, Any] = {
+            "sources": {
+                "offsets": near,
+                "far_offsets": far,
+                "count": len(near),
+                "far_count": len(far),
+            },
             "surfaces": arrays.pop("surfaces"),
-            "tile_candidates": candidates,
-            "scattered": scattered,
+            "tile_candidates": starts[0],
+            "scattered": starts[1],
         }
-        wide, side, block, times = (
-            int(classify.source.constant(n))
-            for n in ("CELL_TILES", "TILE", "BLOCK", "TIMES_PER_WORD")
-        )
-        across, down = grid_of(inputs.bindings.size)
-        blocks = -(-across // wide) * wide * side // block, down * side // block
-        words = self._images.texture(
-            "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
-        )
-        mask = array(words)
-        # Lists of plain blocks, of others, of others in crowded tiles; the same near moving light.
-        size = (
-            4 * -(-(blocks[0] * blocks[1] + int(classify.source.constant("CELLS_WORD"))) // 64) * 64
-        )
-        count = int(classify.source.constant("LISTS"))
-        lists = {"buffer": self._blocks.at_least(count * size), "offset": 0, "size": count * size}
-        encoder.clear_buffer(lists["buffer"], 0, count * size)
-        light = {one: self._light(one) for one in (None, added)}
-        changes = light[added]["light_changes"]
-        for entry, over in (("main", blocks), ("size_lists", (count * classify.workgroup[0], 1))):
-            classify.run(
-                encoder,
-                entry,
-                replace(inputs.bindings, size=over),
-                single_layer_mask=mask,
-                active_cells=worklists["active"],
-                lists=lists,
-                light_changes=changes,
-                **searched,
-            )
-        plain, others, crowded, *lit = (
-            lists | {"offset": k * size, "size": size} for k in range(count)
-        )
-        separated = worklists["separated"]
-        differences = self._differences(encoder, inputs, layers["surfaces"], separated)
-        passes = [
-            ("main", others, {}, None),
-            ("main", crowded, {"CROWDED": True}, None),
-            ("main", plain, {"PLAIN": True}, None),
-        ]
-        if static := worklists.get("static"):
-            passes.append(("copy_static", static, {"PLAIN": True}, added))
-        if added is not None:
-            passes += [("main", lit[1], {}, added), ("main", lit[2], {"CROWDED": True}, added),
-                       ("main", lit[0], {"PLAIN": True}, added)]  # fmt: skip
-        for entry, cells, kind, moving in passes:
+        timed: dict[str, Any] = {
+            "BOX_SHUTTER": inputs.even,
+            "ADAPTIVE": inputs.auto,
+            "FAR": bool(far),
+            "WEIGHTED": inputs.frame.weight is not None,
+        }
+        active = worklists["active"]
+        mask, lists = self._classify(encoder, inputs, active, shared, added, timed)
+        differences = self._differences(encoder, inputs, layers["surfaces"], worklists["separated"])
+        # The blocks are searched list by list, each with a kernel that does no more than it must.
+        for entry, cells, kind, moving in _passes(lists, worklists.get("static"), added):
             kernel = gpu.kernel(
                 self._device,
                 "methods/gather/search/resolve.wgsl",
@@ -121,45 +86,98 @@ class Search:
                 single_layer_mask=mask,
                 second_differences=differences,
                 own_color=inputs.frame.color,
-                own_weight=inputs.frame.weight or inputs.unbound,
+                own_weight=inputs.frame.weight,
                 linear=inputs.linear,
                 output=output,
-                **light[moving],
-                **searched,
+                light_nodes=moving.times if moving else {},
+                added_light=moving and moving.view,
+                light_changes=moving and moving.change_flags,
+                **shared,
                 **arrays,
             )
 
-    def _light(self, added: Added | None) -> dict:
-        """Bindings of the search for moving light, or for none."""
-        source = wgsl.load("methods/gather/search/moving_light.wgsl")
-        nodes = np.zeros((), source.dtype("LightNodes"))
-        if added is None:
-            none = self._images.texture("no light", (1, 1), "rgba16float")
-            layers = self._images.view_of(none, dimension="2d-array")
-            changes = self._no_changes.at_least(4)
-        else:
-            layers, times = added.view, added.times
-            changes = added.change_flags
-            nodes["first"], nodes["step"], nodes["count"] = times.first, times.step, times.count
-        return {
-            "light_nodes": uniform(self._device, "light nodes", nodes),
-            "added_light": layers,
-            "light_changes": changes,
-        }
+    def _classify(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        active: gpu.BufferPart,
+        shared: Mapping[str, Any],
+        added: Added | None,
+        timed: Mapping[str, Any],
+    ) -> tuple[View, list[gpu.BufferPart]]:
+        """Record which blocks have one layer at which times, and their lists: plain blocks, others,
+        and others in crowded tiles; then the same of blocks near moving light."""
+        kernel = gpu.kernel(
+            self._device,
+            "methods/gather/search/classify.wgsl",
+            MOVING_LIGHT=added is not None,
+            LIGHT_SCALE=added.scale if added else 1,
+            **timed,
+        )
+        wide, side, block, times, head, count = map(
+            kernel.source.integer,
+            ("CELL_TILES", "TILE", "BLOCK", "TIMES_PER_WORD", "CELLS_WORD", "LISTS"),
+        )
+        across, down = grid_of(inputs.bindings.size)
+        blocks = -(-across // wide) * wide * side // block, down * side // block
+        words = self._images.texture(
+            "single-layer mask", blocks, "r32uint", -(-inputs.samples // times) + 1
+        )
+        mask = self._images.view_of(words, dimension="2d-array")
+        size = 4 * -(-(blocks[0] * blocks[1] + head) // 64) * 64
+        lists = {"buffer": self._blocks.at_least(count * size), "offset": 0, "size": count * size}
+        encoder.clear_buffer(lists["buffer"], 0, count * size)
+        for entry, over in (("main", blocks), ("size_lists", (count * kernel.workgroup[0], 1))):
+            kernel.run(
+                encoder,
+                entry,
+                inputs.bindings,
+                over,
+                single_layer_mask=mask,
+                active_cells=active,
+                lists=lists,
+                light_changes=added and added.change_flags,
+                **shared,
+            )
+        return mask, [lists | {"offset": k * size, "size": size} for k in range(count)]
 
-    def _differences(self, encoder, inputs, surfaces, cells) -> wgpu.GPUTextureView:
+    def _differences(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        surfaces: wgpu.GPUTexture,
+        cells: gpu.BufferPart,
+    ) -> View:
         """Record the second differences of the frame's own colours."""
         differences = self._images.view("second differences", inputs.bindings.size, "rgba32uint")
-        texels = {"color": gpu.stored(inputs.frame.color)}
-        kernel = gpu.kernel(self._device, "methods/gather/search/cubic.wgsl", texels)
+        color = inputs.frame.color
+        kernel = gpu.kernel(self._device, "methods/gather/search/cubic.wgsl", {"color": color})
         kernel.run(
             encoder,
             "main",
             inputs.bindings,
             cells,
-            color=inputs.frame.color,
+            color=color,
             front_surface=self._images.layer(surfaces, 0),
             second_differences=differences,
             worklist=cells,
         )
         return differences
+
+
+def _passes(
+    lists: Sequence[gpu.BufferPart], static: gpu.BufferPart | None, added: Added | None
+) -> list[tuple[str, gpu.BufferPart, dict[str, Any], Added | None]]:
+    """Entry points of resolve.wgsl: each with its list, its constants, and the light it follows."""
+    plain, others, crowded, *lit = lists
+    passes: list[tuple[str, gpu.BufferPart, dict[str, Any], Added | None]] = [
+        ("main", others, {}, None),
+        ("main", crowded, {"CROWDED": True}, None),
+        ("main", plain, {"PLAIN": True}, None),
+    ]
+    if static:
+        passes.append(("copy_static", static, {"PLAIN": True}, added))
+    if added is not None:
+        passes += [("main", lit[1], {}, added), ("main", lit[2], {"CROWDED": True}, added),
+                   ("main", lit[0], {"PLAIN": True}, added)]  # fmt: skip
+    return passes

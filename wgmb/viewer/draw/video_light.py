@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import wgpu
 
 from ... import gpu
@@ -54,18 +53,14 @@ class VideoLight:
         kernel = gpu.kernel(
             self._device, "viewer/draw/video_light.wgsl", {"Output": _TEXEL}, HLG=of_scene
         )
-        onto = np.zeros((), kernel.source.dtype("Onto"))
-        rows = conversion(primaries, REC709)
-        for name, row in zip(("red", "green", "blue"), rows, strict=True):
-            onto[name][:3] = row
-        onto["luminance"][:3] = luminance(primaries)
-        uniform, create = wgpu.BufferUsage.UNIFORM, self._device.create_buffer_with_data
+        red, green, blue = conversion(primaries, REC709)
+        onto = {"red": red, "green": green, "blue": blue, "luminance": luminance(primaries)}
         encoder = self._device.create_command_encoder(label="video light")
         kernel.run(
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, size),
-            onto=create(data=onto, usage=uniform),
+            onto=onto,
             light=light.create_view(),
             output=output.create_view(),
         )

@@ -13,7 +13,7 @@ from ...gpu import wgsl
 from ...gpu.textures import TexturePool
 
 _COMPOSE = wgsl.load("viewer/draw/compose.wgsl")
-STOPS = int(_COMPOSE.constant("LOWEST")), int(_COMPOSE.constant("HIGHEST"))
+STOPS = _COMPOSE.integer("LOWEST"), _COMPOSE.integer("HIGHEST")
 """Range of the scopes and of false colours [stops from 1.0]."""
 _BINS, _COLUMNS = 64, 240
 _MOST = 480  # pixels a side that are looked at, evenly spaced: the window waits for it

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import wgpu
 
 from .... import gpu
 from ....gpu.textures import ScratchBuffer, TexturePool
+from ...contract import Inputs, PreparedFrame, View
 from ..tiles.active_tiles import grid_of
 
 
@@ -19,24 +19,23 @@ class Edges:
         self._device, self._images = device, images
         self._crowds = ScratchBuffer(device)
 
-    def encode(self, encoder, inputs, frame, worklist: dict) -> dict:
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        frame: PreparedFrame,
+        worklist: gpu.BufferPart,
+    ) -> dict[str, View | wgpu.GPUBuffer]:
         """Record the search for a frame's edges, and return them by the names of their bindings:
         "edge_flags" per pixel and "crowds" per tile."""
         size = inputs.bindings.size
         flags = self._images.view("edge flags", size, "r32uint")
-        texels = {"motion": gpu.stored(frame.motion), "depth": gpu.stored(frame.depth)}
-        kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl", texels)
-        kinds = int(kernel.source.constant("KINDS"))
+        read = {"motion": frame.motion, "depth": frame.depth}
+        kernel = gpu.kernel(self._device, "methods/gather/layers/edges.wgsl", read)
+        kinds = kernel.source.integer("KINDS")
         crowds = self._crowds.at_least(4 * kinds * math.prod(grid_of(size)))
         encoder.clear_buffer(crowds)
-        given = {
-            "worklist": worklist,
-            "motion": frame.motion,
-            "depth": frame.depth,
-            "edge_flags_out": flags,
-            "crowds": crowds,
-        }
-        kernel.run(encoder, "detect_edges", inputs.bindings, worklist, **given)
-        tiles = replace(inputs.bindings, size=grid_of(size))
-        kernel.run(encoder, "look_around_tiles", tiles, **given)
+        own = {"worklist": worklist, "edge_flags_out": flags, "crowds": crowds, **read}
+        kernel.run(encoder, "detect_edges", inputs.bindings, worklist, **own)
+        kernel.run(encoder, "look_around_tiles", inputs.bindings, grid_of(size), **own)
         return {"edge_flags": flags, "crowds": crowds}

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from typing import Any
 
 import wgpu
 
 from .... import gpu
 from ....gpu.textures import ScratchBuffer, TexturePool
+from ...contract import Inputs, PreparedFrame, View
 from .edges import Edges
 from .relight import Relight
 
@@ -23,7 +25,7 @@ class Layers:
     def __init__(self, device: wgpu.GPUDevice, images: TexturePool, most: int):
         self._device, self._images = device, images
         self._edges, self._edge_pixels = Edges(device, images), ScratchBuffer(device)
-        self._edge_groups, self._unused = ScratchBuffer(device), ScratchBuffer(device)
+        self._edge_groups = ScratchBuffer(device)
         self._relight = Relight(device)
         self._most, self._slots = most, 1
         self.textures: dict[str, wgpu.GPUTexture] = {}
@@ -50,23 +52,30 @@ class Layers:
             "mattes": self._images.layer(self.textures["mattes"], slot),
         }
 
-    def _far(self, inputs, offset: int) -> dict[str, wgpu.GPUTextureView]:
+    def _far(self, inputs: Inputs, offset: int) -> dict[str, View | None]:
         """Inputs of a frame's layers from frames beyond the neighbours: all of them for the frame
         itself, nothing for the others."""
         near = sum(abs(frame.offset) <= 1 for frame in inputs.frames)
         far = 0 if offset else len(inputs.frames) - near
-        views: dict[str, wgpu.GPUTextureView] = {}
-        for name, per_frame in (("layer_colors", 2), ("surfaces", 2), ("mattes", 1)):
-            texture, first, count = self.textures[name], per_frame * near, per_frame * far
-            if not far:
-                texture = self._images.texture(f"no {name}", (1, 1), texture.format)
-                first, count = 0, 1
-            views[f"far_{name}"] = self._images.view_of(
-                texture, dimension="2d-array", base_array_layer=first, array_layer_count=count
+        per_frame = {"layer_colors": 2, "surfaces": 2, "mattes": 1}
+        if not far:
+            return dict.fromkeys(f"far_{name}" for name in per_frame)
+        return {
+            f"far_{name}": self._images.view_of(
+                self.textures[name],
+                dimension="2d-array",
+                base_array_layer=layers * near,
+                array_layer_count=layers * far,
             )
-        return views
+            for name, layers in per_frame.items()
+        }
 
-    def encode(self, encoder, inputs, worklists: dict[str, dict]) -> None:
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        worklists: Mapping[str, gpu.BufferPart],
+    ) -> None:
         """Record the layers of all frames, where something moves near."""
         size = inputs.bindings.size
         count = self._slots = self._most if len(inputs.frames) > 1 else self._slots
@@ -87,71 +96,51 @@ class Layers:
             }
             self._separate(encoder, inputs, slot, frame, around, worklists)
 
-    def _separate(self, encoder, inputs, slot: int, frame, neighbours, worklists):
+    def _separate(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        slot: int,
+        frame: PreparedFrame,
+        neighbours: Mapping[str, PreparedFrame | None],
+        worklists: Mapping[str, gpu.BufferPart],
+    ) -> None:
         """Record the layers of a frame, of which `neighbours` may show what it does not."""
         size, colors = inputs.bindings.size, self.textures["layer_colors"]
+        # Away from silhouettes the foreground is the frame itself; nothing is behind it.
         if copied := _is_like(frame.color.texture, colors):
             _copy(encoder, (frame.color.texture, 0), (colors, 2 * slot))
-        found = self._edges.encode(encoder, inputs, frame, worklists["flagged"])
-        groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
         cells = worklists["separated"]
-        passes: dict[str, tuple[dict | None, dict]] = {
-            "copy_motion_only": (worklists["motion_only"],) * 2,
-            "write_single_layer": (cells, cells),
-            "size_dispatch": (None, cells),
-            "separate_layers": (groups, cells),
-        }
-        read = {name: getattr(frame, name) for name in ("color", "motion", "depth")}
-        others = {
-            f"{side}_{name}": getattr(other or frame, name) or inputs.unbound
-            for side, other in neighbours.items()
-            for name in ("color", "motion", "depth", "weight")
-        }
-        written = {"Color": colors.format, "Mattes": self.textures["mattes"].format}
+        edges = self._edges.encode(encoder, inputs, frame, worklists["flagged"])
+        bound = self._bound(inputs, slot, frame, neighbours)
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers/layers.wgsl",
-            written | {name: gpu.stored(view) for name, view in (read | others).items()},
+            {"Color": colors.format, "Mattes": self.textures["mattes"].format} | bound,
             WEIGHTED=frame.weight is not None,
             COPIED=copied,
         )
-        there = {other.offset for other in inputs.frames}
-        around = gpu.uniform(
-            self._device,
-            "methods/gather/layers/around.wgsl",
-            "Neighbours",
-            has_prev=neighbours["prev"] is not None,
-            has_next=neighbours["next"] is not None,
-            own_is_prev=frame.offset == 1,
-            own_is_next=frame.offset == -1,
-            relit=not frame.offset,
-            has_far_prev=not frame.offset and -2 in there,
-            has_far_next=not frame.offset and 2 in there,
-        )
         pixels = self._edge_pixels.at_least(4 + 4 * size[0] * size[1])
         encoder.clear_buffer(pixels, 0, 4)
-        gains = {
-            f"{side}_gains": self._relight.gains(size, step)
-            for side, step in (("prev", -1), ("next", 1))
+        groups = {"buffer": self._edge_groups.at_least(16), "offset": 0, "size": 16}
+        # One layer everywhere, and a list of the pixels at silhouettes; only these get two layers.
+        passes: dict[str, tuple[tuple[int, int] | gpu.BufferPart, gpu.BufferPart]] = {
+            "copy_motion_only": (worklists["motion_only"], worklists["motion_only"]),
+            "write_single_layer": (cells, cells),
+            "size_dispatch": ((1, 1), cells),
+            "separate_layers": (groups, cells),
         }
-        for entry, (indirect, worklist) in passes.items():
-            sizing = entry == "size_dispatch"
+        for entry, (over, worklist) in passes.items():
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.bindings, size=(1, 1)) if sizing else inputs.bindings,
-                indirect,
+                inputs.bindings,
+                over,
                 worklist=worklist,
-                weight=frame.weight or inputs.unbound,
-                neighbours=around,
                 edges=pixels,
-                edge_groups=groups if sizing else self._unused.at_least(16),
-                **read,
-                **found,
-                **self._views(slot),
-                **self._far(inputs, frame.offset),
-                **others,
-                **gains,
+                edge_groups=groups if entry == "size_dispatch" else None,
+                **bound,
+                **edges,
             )
             if entry == "write_single_layer":
                 surfaces = self.textures["surfaces"]
@@ -159,7 +148,40 @@ class Layers:
             if entry == "write_single_layer" and not frame.offset:
                 self._relit(encoder, inputs, cells)
 
-    def _relit(self, encoder, inputs, cells: dict) -> None:
+    def _bound(
+        self,
+        inputs: Inputs,
+        slot: int,
+        frame: PreparedFrame,
+        neighbours: Mapping[str, PreparedFrame | None],
+    ) -> dict[str, Any]:
+        """Bindings that all passes over the layers of a frame share."""
+        offsets = {other.offset for other in inputs.frames}
+        around = {
+            "has_prev": neighbours["prev"] is not None,
+            "has_next": neighbours["next"] is not None,
+            "own_is_prev": frame.offset == 1,
+            "own_is_next": frame.offset == -1,
+            "relit": not frame.offset,
+            "has_far_prev": not frame.offset and -2 in offsets,
+            "has_far_next": not frame.offset and 2 in offsets,
+        }
+        others = {
+            f"{side}_{name}": getattr(other or frame, name)
+            for side, other in neighbours.items()
+            for name in ("color", "motion", "depth", "weight")
+        }
+        own = {name: getattr(frame, name) for name in ("color", "motion", "depth", "weight")}
+        gains = {
+            f"{side}_gains": self._relight.gains(inputs.bindings.size, step)
+            for side, step in (("prev", -1), ("next", 1))
+        }
+        layers = self._views(slot) | self._far(inputs, frame.offset)
+        return {"neighbours": around, **own, **others, **layers, **gains}
+
+    def _relit(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, cells: gpu.BufferPart
+    ) -> None:
         """Record that the neighbours get the light of the frame where it hides what they show."""
         for slot, frame in enumerate(inputs.frames):
             if abs(frame.offset) == 1:
@@ -176,7 +198,11 @@ def _is_like(image: wgpu.GPUTexture, layers: wgpu.GPUTexture) -> bool:
     return readable and single and same
 
 
-def _copy(encoder, source: tuple[wgpu.GPUTexture, int], target: tuple[wgpu.GPUTexture, int]):
+def _copy(
+    encoder: wgpu.GPUCommandEncoder,
+    source: tuple[wgpu.GPUTexture, int],
+    target: tuple[wgpu.GPUTexture, int],
+) -> None:
     """Record a copy of one layer of a texture into one of another, or of the same."""
     texture, layer = source
     into, number = target

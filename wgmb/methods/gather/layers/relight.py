@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
-import numpy as np
 import wgpu
 
 from .... import gpu
 from ....gpu.textures import ScratchBuffer
-from ..tiles.active_tiles import grid_of, uniform
+from ...contract import Inputs, PreparedFrame, View
+from ..tiles.active_tiles import grid_of
 
 
 class Relight:
@@ -19,34 +18,37 @@ class Relight:
     def __init__(self, device: wgpu.GPUDevice):
         self._device = device
         self._hidden, self._groups = ScratchBuffer(device), ScratchBuffer(device)
-        self._changes, self._unused = ScratchBuffer(device), ScratchBuffer(device)
+        self._changes = ScratchBuffer(device)
         self._gains = {-1: ScratchBuffer(device), 1: ScratchBuffer(device)}
 
     def gains(self, size: tuple[int, int], offset: int) -> wgpu.GPUBuffer:
         """The gain of every pixel of a neighbour, as `encode` finds it."""
         return self._gains[offset].at_least(4 * size[0] * size[1])
 
-    def encode(self, encoder, inputs, frame, surfaces, relit: wgpu.GPUTextureView, cells: dict):
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        frame: PreparedFrame,
+        surfaces: tuple[View, View],
+        relit: View,
+        cells: gpu.BufferPart,
+    ) -> None:
         """Record it for the neighbour `frame`, in the worklist `cells`.
 
         `surfaces`: the front surfaces of the frame itself, whose edges need not be separated yet,
         and of the neighbour. `relit`: the neighbour's front layer, which has its colours.
         """
+        own = inputs.frame
         kernel = gpu.kernel(
             self._device,
             "methods/gather/layers/relight.wgsl",
-            {
-                "Color": relit.texture.format,
-                "color": gpu.stored(frame.color),
-                "own_texels": gpu.stored(inputs.frame.color),
-            },
+            {"Color": relit.texture.format, "color": frame.color, "own_texels": own.color},
             WEIGHTED=frame.weight is not None,
         )
-        data = np.zeros((), kernel.source.dtype("RelitFrame"))
-        data["offset"] = frame.offset
-        own, front = surfaces
+        own_surface, front_surface = surfaces
         size = inputs.bindings.size
-        side = int(kernel.source.constant("SQUARE"))
+        side = kernel.source.integer("SQUARE")
         squares = math.ceil(size[0] / side) * math.ceil(size[1] / side)
         hidden = self._hidden.at_least(4 + 8 * squares)
         changes = self._changes.at_least(8 * math.prod(grid_of(size)))
@@ -54,29 +56,31 @@ class Relight:
         encoder.clear_buffer(changes)
         encoder.clear_buffer(gains := self.gains(size, int(frame.offset)))
         groups = {"buffer": self._groups.at_least(16), "offset": 0, "size": 16}
-        for entry, indirect, over in (
-            ("find_hidden", cells, size),
-            ("spread_changes", None, grid_of(size)),
-            ("size_dispatch", None, (1, 1)),
-            ("relight", groups, size),
-        ):
-            sizing = entry == "size_dispatch"
+        # Only pixels that the frame hides are relit, and only near tiles in which light changes:
+        # the first pass lists them, the last one scales their light by the ratio seen beside them.
+        passes: tuple[tuple[str, tuple[int, int] | gpu.BufferPart], ...] = (
+            ("find_hidden", cells),
+            ("spread_changes", grid_of(size)),
+            ("size_dispatch", (1, 1)),
+            ("relight", groups),
+        )
+        for entry, over in passes:
             kernel.run(
                 encoder,
                 entry,
-                replace(inputs.bindings, size=over),
-                indirect,
-                source=uniform(self._device, "source", data),
+                inputs.bindings,
+                over,
+                source={"offset": frame.offset},
                 color=frame.color,
-                weight=frame.weight or inputs.unbound,
-                front_surface=front,
-                own_color=inputs.frame.color,
-                own_texels=inputs.frame.color,
-                own_weight=inputs.frame.weight or inputs.unbound,
-                own_surface=own,
+                weight=frame.weight,
+                front_surface=front_surface,
+                own_color=own.color,
+                own_texels=own.color,
+                own_weight=own.weight,
+                own_surface=own_surface,
                 worklist=cells,
                 hidden=hidden,
-                groups=groups if sizing else self._unused.at_least(16),
+                groups=groups if entry == "size_dispatch" else None,
                 changes=changes,
                 gains=gains,
                 relit=relit,

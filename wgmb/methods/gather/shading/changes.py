@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import wgpu
-
+from ...contract import View
 from .stage import Stage
-
-View = wgpu.GPUTextureView
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ def reduced(
 
 def _both(stage: Stage, own: SurfaceLight, other: SurfaceLight, offset: int) -> dict[str, Any]:
     """Bindings of passes that compare the frame with the neighbour at `offset`."""
-    return {"side": stage.uniform("changes/side", "Side", next=offset > 0), **_pair(own, other)}
+    return {"side": {"next": offset > 0}, **_pair(own, other)}
 
 
 def _pair(own: SurfaceLight, other: SurfaceLight) -> dict[str, Any]:
@@ -125,17 +122,13 @@ def changes(
         peaks, gain, coherence = (
             stage.sparse(name, "r32float") for name in ("peaks", "gain", "coherence")
         )
-        four, one, none = (
-            stage.unused("rgba16float"),
-            stage.unused("r32float"),
-            stage.none("r32float"),
-        )
+        # Of what was measured, only changes that can be seen and are more than noise count.
         for entry, ratio, scalar, ratio_out, scalar_out in (
-            ("smooth_ratio", raw, none, smooth, one),
-            ("find_peaks", smooth, none, four, peaks),
-            ("find_coherence", smooth, none, four, coherence),
-            ("find_gain", smooth, peaks, four, gain),
-            ("limit_ratio", smooth, gain, limited, one),
+            ("smooth_ratio", raw, None, smooth, None),
+            ("find_peaks", smooth, None, None, peaks),
+            ("find_coherence", smooth, None, None, coherence),
+            ("find_gain", smooth, peaks, None, gain),
+            ("limit_ratio", smooth, gain, limited, None),
         ):
             if entry == "find_coherence" and not distrusts:
                 continue
@@ -147,8 +140,8 @@ def changes(
                 ratio=ratio,
                 scalar=scalar,
                 light_here=here.light,
-                albedo=albedo or stage.none("rgba16float"),
-                coherence=coherence if entry == "find_gain" else none,
+                albedo=albedo,
+                coherence=coherence if entry == "find_gain" else None,
                 ratio_out=ratio_out,
                 scalar_out=scalar_out,
             )

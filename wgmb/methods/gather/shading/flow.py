@@ -8,7 +8,7 @@ from typing import Any
 
 from ....gpu import wgsl
 from .changes import View
-from .stage import FOLDER, Stage
+from .stage import FOLDER, Size, Stage
 
 COARSE = 3  # first level whose patches are all searched, at all of their pixels
 COARSEST = 20  # px along the longer side of the coarsest level, at least
@@ -23,7 +23,7 @@ class LightFlow:
     back: View
 
 
-def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
+def level_sizes(size: Size) -> list[Size]:
     """Width, height of every level of a pyramid, the frame's own first."""
     sizes = [size]
     while max(sizes[-1]) >= 2 * COARSEST:
@@ -31,21 +31,21 @@ def level_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
     return sizes
 
 
-def patch_grid(size: tuple[int, int]) -> tuple[int, int]:
+def patch_grid(size: Size) -> Size:
     """Patches across and down a level, as patches_along() of flow.wgsl."""
     source = wgsl.load(f"{FOLDER}/flow.wgsl")
-    patch, stride = (int(source.constant(name)) for name in ("PATCH", "STRIDE"))
+    patch, stride = map(source.integer, ("PATCH", "STRIDE"))
     across, down = (max(n - patch + stride - 1, 0) // stride + 1 for n in size)
     return across, down
 
 
-def flow_size(size: tuple[int, int]) -> tuple[int, int]:
+def flow_size(size: Size) -> Size:
     """The size of the flow of a coarse level, as write_flow() of flow.wgsl."""
-    every = int(wgsl.load(f"{FOLDER}/flow.wgsl").constant("EVERY"))
+    every = wgsl.load(f"{FOLDER}/flow.wgsl").integer("EVERY")
     return -(-size[0] // every), -(-size[1] // every)
 
 
-def grids(size: tuple[int, int]) -> list[tuple[int, int]]:
+def grids(size: Size) -> list[Size]:
     """The sizes of all passes: of levels, of their patches and of their flow."""
     sizes = level_sizes(size)
     return list(dict.fromkeys([*sizes, *map(patch_grid, sizes), *map(flow_size, sizes[1:])]))
@@ -111,7 +111,6 @@ def _extrapolated(
     by_color: bool,
 ) -> dict[int, View]:
     """Flow to each neighbour, not as searched where the other one or a body explains more."""
-    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
     cells = grid_of_cells(stage.size)
     nearest, others, bodies = (
         stage.sparse(name, "rgba16float", cells)
@@ -120,26 +119,28 @@ def _extrapolated(
 
     def run(entry: str, side: int, **bindings: Any) -> None:
         way, other = searched[side], searched.get(-side)
-        given: dict[str, Any] = {
-            "values": values[0], "values_there": values[side],
-            "values_other": values.get(-side, none), "change": changed[side],
-            "flow": way.ahead, "flow_back": way.back, "flow_other": other.ahead if other else none,
-            "bodies": bodies, "others": none, "around": wide, "around_other": wide,
-            "flow_out": spare, "bodies_out": spare, "others_out": spare,
-            "weighted": stage.unused("rgba32float"),
-            "side": stage.uniform("changes/side", "Side", next=side > 0), **surfaces,
+        of_side: dict[str, Any] = {
+            "values": values[0], "values_there": values[side], "values_other": values.get(-side),
+            "change": changed[side], "flow": way.ahead, "flow_back": way.back,
+            "flow_other": other and other.ahead, "bodies": bodies, "side": {"next": side > 0},
         }  # fmt: skip
+        unused = dict.fromkeys(
+            ("others", "around", "around_other", "flow_out", "bodies_out", "others_out", "weighted")
+        )
         constants: dict[str, float] = {"COLORS": by_color}
-        stage.run("extrapolate", entry, over="near", constants=constants, **given | bindings)
+        bindings = {**unused, **of_side, **surfaces, **bindings}
+        stage.run("extrapolate", entry, over="near", constants=constants, **bindings)
 
-    spare, one = stage.unused("rgba16float"), next(iter(searched))
-    run("find_bodies", one, halved=True, bodies=none, bodies_out=nearest, others_out=others)
+    # Where a body hides a shadow, no flow is found: the shadow shares the motion of a body near it.
+    one = next(iter(searched))
+    run("find_bodies", one, halved=True, bodies=None, bodies_out=nearest, others_out=others)
     found: dict[str, Any] = {"halved": True, "bodies": nearest, "others": others}
     differs = {side: stage.sparse(f"bodies {side}", "rgba32float", cells) for side in searched}
     for side in searched:
         run("compare_bodies", side, **found, weighted=differs[side])
-    run("choose_body", one, **found, around=differs[one], around_other=differs.get(-one, wide),
+    run("choose_body", one, **found, around=differs[one], around_other=differs.get(-one),
         bodies_out=bodies)  # fmt: skip
+    # Pixels choose among that, the flow to the other neighbour turned round, and their own.
     around, result = {}, {}
     weighted = stage.sparse("weighted", "rgba32float")
     for side in searched:
@@ -149,7 +150,7 @@ def _extrapolated(
     near = stage.sparse("around", "rgba32float", half_size(stage.size))
     for side in searched:
         chosen = stage.sparse("chosen", "rgba16float")
-        run("choose", side, around=around[side], around_other=around.get(-side, wide),
+        run("choose", side, around=around[side], around_other=around.get(-side),
             flow_out=chosen)  # fmt: skip
         run("weigh", side, flow=chosen, weighted=weighted)
         blurred(stage, weighted, SPREAD, near)
@@ -158,9 +159,9 @@ def _extrapolated(
     return result
 
 
-def grid_of_cells(size: tuple[int, int]) -> tuple[int, int]:
+def grid_of_cells(size: Size) -> Size:
     """The cells of extrapolate.wgsl across and down."""
-    side = int(wgsl.load(f"{FOLDER}/extrapolate.wgsl").constant("CELL"))
+    side = wgsl.load(f"{FOLDER}/extrapolate.wgsl").integer("CELL")
     return -(-size[0] // side), -(-size[1] // side)
 
 
@@ -199,7 +200,7 @@ def blurred(stage: Stage, source: View, sigma: float, output: View) -> None:
     stage.run("blur", "down", source=half, output=output, **given)
 
 
-def half_size(size: tuple[int, int]) -> tuple[int, int]:
+def half_size(size: Size) -> Size:
     """As that of light.wgsl: a pixel stands for 2 x 2."""
     return -(-size[0] // 2), -(-size[1] // 2)
 
@@ -218,18 +219,15 @@ def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str,
 
 def _accept(stage: Stage, entry: str, **bindings: Any) -> None:
     """Record an entry point of accept.wgsl, which does not use all of them."""
-    none, wide = stage.none("rgba16float"), stage.none("rgba32float")
-    given: dict[str, Any] = {
-        "flow": none, "flow_back": none, "values": none, "values_there": none, "around": wide,
-        "known": wide, "planes": wide, "flow_out": stage.unused("rgba16float"),
-        "weighted": stage.unused("rgba32float"),
-    }  # fmt: skip
-    stage.run("accept", entry, over="near", **given | bindings)
+    names = ("flow", "flow_back", "values", "values_there", "around", "known", "planes",
+             "flow_out", "weighted")  # fmt: skip
+    unused: dict[str, Any] = dict.fromkeys(names)
+    stage.run("accept", entry, over="near", **unused | bindings)
 
 
 def _search(stage: Stage, name: str, here: list[Level], other: list[Level]) -> View:
     """Flow by itself, from the coarsest level to the finest."""
-    coarse = stage.none("rgba16float")
+    coarse: View | None = None
     sizes = level_sizes(stage.size)
     for i in reversed(range(len(sizes))):
         grid = patch_grid(sizes[i])
@@ -239,19 +237,20 @@ def _search(stage: Stage, name: str, here: list[Level], other: list[Level]) -> V
             found = stage.sparse(name_of_flow, "rgba16float")
         else:
             found = stage.texture(name_of_flow, "rgba16float", flow_size(sizes[i]))
-        no_patches, no_flow = stage.unused("rgba32float"), stage.unused("rgba16float")
-        coarse_or_not: dict[str, float] = {"IS_COARSE": i >= COARSE}
-        passes = [("search", grid, stage.none("rgba32float"), first, no_flow)]
+        constants = {"IS_COARSE": i >= COARSE}
+        passes: list[tuple[str, Size | None, View | None, View | None, View | None]]
+        passes = [("search", grid, None, first, None)]
         if finest:  # from flow that was propagated on the coarser level
-            passes += [("write_finest", None, first, no_patches, found)]
+            passes += [("write_finest", None, first, None, found)]
         else:
-            passes += [("propagate", grid, first, second, no_flow),
-                       ("write_flow", flow_size(sizes[i]), second, no_patches, found)]  # fmt: skip
+            passes += [("propagate", grid, first, second, None),
+                       ("write_flow", flow_size(sizes[i]), second, None, found)]  # fmt: skip
         for entry, size, patches, patches_out, flow_out in passes:
             stage.run(
-                "flow", entry, size=size, over=None if size else "near", constants=coarse_or_not,
+                "flow", entry, size=size, over=None if size else "near", constants=constants,
                 here=here[i].gradients, there=other[i].squares, coarse=coarse, patches=patches,
                 patches_out=patches_out, flow_out=flow_out,
             )  # fmt: skip
         coarse = found
+    assert coarse is not None, "an image has a level"
     return coarse

@@ -100,7 +100,12 @@ class MovingLight:
         self._kept = {name: ScratchBuffer(device) for name in ("change flags", "gates", *_LISTS)}
 
     def encode(
-        self, encoder, bindings, kinds: Sequence[Kind], times: LightTimes, weight: View | None
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        bindings: gpu.FrameBindings,
+        kinds: Sequence[Kind],
+        times: LightTimes,
+        weight: View | None,
     ) -> Added:
         """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
         resting = kinds[0].resting
@@ -113,40 +118,46 @@ class MovingLight:
             bindings = replace(less, groups=bindings.groups)
         tiles = math.prod(_tile_grid(bindings.size))
         sizes = {"change flags": 4 * (1 + tiles), "gates": GATES_SIZE}
-        kept = {
+        kept: dict[str, Any] = {
             name: buffer.at_least(sizes.get(name, 16 * (3 + tiles // 4)))
             for name, buffer in self._kept.items()
         }
         for buffer in kept.values():
             encoder.clear_buffer(buffer)
         change_flags, gates = kept.pop("change flags"), kept.pop("gates")
-        lists: dict[str, Any] = kept
-        stage = Stage(
-            self._device, self._images, encoder, bindings, "", False, False, {}, change_flags, lists
-        )
+        begun: set[str] = set()
         stages = [
-            replace(
-                stage,
-                name="glossy" if kind.pulled else "diffuse",
+            Stage(
+                self._device,
+                self._images,
+                encoder,
+                bindings,
+                "glossy" if kind.pulled else "diffuse",
                 pulled=kind.pulled,
                 resting=kind.resting,
+                change_flags=change_flags,
+                lists=kept,
+                begun=begun,
             )
             for kind in kinds
         ]
-        grid = _tile_grid(stage.size)
+        whole, grid = stages[-1], _tile_grid(bindings.size)
+        # Most light rests: a first look lists the tiles in which a neighbour may differ.
         for stage, kind in zip(stages, kinds, strict=True):
             screen(stage, kind.frames, scale)
-        stage.run("near", "list_doubtful", size=grid, **lists)
-        stage.run("near", "size_doubtful", size=(1, 1), **lists)
+        whole.run("near", "list_doubtful", size=grid, **kept)
+        whole.run("near", "size_doubtful", size=(1, 1), **kept)
+        # There the change to each neighbour is measured, and the tiles with one are listed.
         if resting:
-            kinds = [replace(one, frames=reduced(stage, one.frames, scale)) for one in kinds]
+            kinds = [replace(one, frames=reduced(whole, one.frames, scale)) for one in kinds]
         changed = [
             changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
-        stage.run("near", "main", size=grid, **lists)
-        stage.run("near", "size_lists", size=(1, 1), **lists)
-        gated = stage.gated(grids(stage.size), gates).gates
+        whole.run("near", "main", size=grid, **kept)
+        whole.run("near", "size_lists", size=(1, 1), **kept)
+        # Around these, light is followed to the times of the nodes; nowhere, if none changes.
+        gated = whole.gated(grids(whole.size), gates).gates
         earlier = None
         for stage, kind, by_side in zip(stages, kinds, changed, strict=True):
             stage = replace(stage, gates=gated)
@@ -186,51 +197,52 @@ class MovingLight:
         }
         for buffer in buffers.values():
             stage.encoder.clear_buffer(buffer, 0, pixels)
-        none = stage.none("rgba16float")
         constants: dict[str, float] = {
             "HAS_ALBEDO": kind.albedo is not None,
             "WEIGHTED": weight is not None,
             "ONTO": earlier is not None,
             "TOLD": self._confidence,
         }
-        before, after = (changed.get(one, none) for one in (-1, 1))
-        around, spare = (one("rgba32uint") for one in (partial(stage.texture, "range"), stage.none))
+        bounds = stage.texture("range", "rgba32uint")
         compose = partial(
             stage.run,
             "compose",
             constants=constants,
             light_here=kind.frames[0].light,
-            albedo=kind.albedo or none,
-            weight=weight or none,
-            after=after,
+            albedo=kind.albedo,
+            weight=weight,
+            after=changed.get(1),
             **buffers,
         )
+        # For each node and each neighbour: shadows are pushed along their flow to its time, and
+        # what arrives, or where reflections are pulled from, becomes an addition to the colours.
         for i, time in enumerate([*times, -1.0, 1.0]):
             side, share = (-1 if time < 0 else 1), min(abs(time), 1.0)
             entry = "main" if i < times.count else "add_neighbour"
             if side not in changed:
                 entry = "rest" if i < times.count else "add_nothing"
-            way = found.get(side, LightFlow(none, none))
-            both = {"values": present[0], "values_there": present.get(side, none),
-                    "flow": way.ahead, "flow_back": way.back}  # fmt: skip
+            way = found.get(side)
+            both = {"values": present[0], "values_there": present.get(side),
+                    "flow": way and way.ahead, "flow_back": way and way.back}  # fmt: skip
             if entry == "main" and not kind.pulled:
-                push = stage.uniform("push", "Push", time=share)
-                stage.run("push", over="near", push=push, **both, **buffers)
-            passes = [(entry, "near", around, spare)]
+                stage.run("push", over="near", push={"time": share}, **both, **buffers)
+            passes: list[tuple[str, str, View | None, View | None]] = [
+                (entry, "near", bounds, None)
+            ]
             if entry == "main":
-                passes = [("begin", "beside", around, spare), (entry, "changing", around, spare)]
+                passes = [("begin", "beside", bounds, None), (entry, "changing", bounds, None)]
             if not i:
-                passes.insert(0, ("find_range", "changing", spare, around))
-            for one, over, range, range_out in passes:
+                passes.insert(0, ("find_range", "changing", None, bounds))
+            for one, over, read, written in passes:
                 compose(
                     one,
                     over=over,
-                    node=stage.uniform("compose", "Node", time=share),
-                    before=changed.get(side, none) if entry == "add_neighbour" else before,
-                    earlier=none if earlier is None else self._images.layer(earlier, i),
+                    node={"time": share},
+                    before=changed.get(side) if entry == "add_neighbour" else changed.get(-1),
+                    earlier=None if earlier is None else self._images.layer(earlier, i),
                     added=self._images.layer(result, i),
-                    range=range,
-                    range_out=range_out,
+                    range=read,
+                    range_out=written,
                     **both,
                 )
         return result
@@ -243,7 +255,7 @@ def _carry(stage: Stage, darkness: View, ways: Mapping[int, LightFlow], times: L
             "carry",
             over="near",
             halved=True,
-            carry=stage.uniform("carry", "Carry", last=max(0.0, *(side * time for time in times))),
+            carry={"last": max(0.0, *(side * time for time in times))},
             values=darkness,
             flow=way.ahead,
             changing=stage.lists["changing"],
@@ -262,5 +274,5 @@ def scale_of(size: tuple[int, int]) -> int:
 
 def _tile_grid(size: tuple[int, int]) -> tuple[int, int]:
     """Tiles of the change flags across and down."""
-    side = int(wgsl.load(f"{FOLDER}/active.wgsl").constant("LIGHT_TILE"))
+    side = wgsl.load(f"{FOLDER}/active.wgsl").integer("LIGHT_TILE")
     return -(-size[0] // side), -(-size[1] // side)

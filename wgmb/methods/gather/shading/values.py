@@ -18,9 +18,8 @@ def values(
 
     `by_color`: the light is the picture itself, and what is brightest around may be its texture.
     """
-    none = stage.none("rgba16float")
-    sides: dict[str, Any] = {"before": changed.get(-1, none), "after": changed.get(1, none)}
-    closed = none
+    sides: dict[str, Any] = {"before": changed.get(-1), "after": changed.get(1)}
+    closed = None
     if not (stage.pulled or stage.resting):
         closed = _closed(stage, here, sides, 0 if by_color else STEPS)
     result = {}
@@ -32,7 +31,7 @@ def values(
             over="whole" if stage.pulled else "near",
             light_here=here.light,
             closed=closed,
-            own=changed.get(offset, none),
+            own=changed.get(offset),
             values=result[offset],
             **sides,
         )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import wgpu
 
 from .... import gpu
 from ....gpu import wgsl
 from ....gpu.textures import ScratchBuffer
-from .active_tiles import grid_of, uniform
+from ...contract import Inputs, PreparedFrame, View
+from .active_tiles import grid_of
 
 _MOST = 3  # frames that are scattered: the frame itself and its neighbours
 
@@ -23,18 +23,18 @@ class Scatter:
         self._device = device
         self._scattered, self._tiles = ScratchBuffer(device), ScratchBuffer(device)
 
-    def tiles(self, encoder, size: tuple[int, int]) -> dict:
+    def tiles(self, encoder: wgpu.GPUCommandEncoder, size: tuple[int, int]) -> gpu.BufferPart:
         """The worklist of the tiles of one frame from which to scatter, recorded to be empty."""
         source = wgsl.load("methods/gather/worklist.wgsl")
-        words = math.prod(grid_of(size)) + int(source.constant("CELLS_WORD"))
+        words = math.prod(grid_of(size)) + source.integer("CELLS_WORD")
         tiles = {"buffer": self._tiles.at_least(8 * words), "offset": 0, "size": 8 * words}
         encoder.clear_buffer(tiles["buffer"], 0, 8 * words)
         return tiles
 
-    def scattered(self, encoder, inputs) -> dict:
+    def scattered(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs) -> gpu.BufferPart:
         """The buffer of all that is scattered, see scattered.wgsl; recorded to be empty."""
         source = wgsl.load("methods/gather/tiles/scattered.wgsl")
-        tile, block, most = (int(source.constant(n)) for n in ("TILE", "BLOCK", "SLICES"))
+        tile, block, most = map(source.integer, ("TILE", "BLOCK", "SLICES"))
         blocks = math.prod(grid_of(inputs.bindings.size)) * (tile // block) ** 2
         slice_size = 4 * blocks * len(_near(inputs))
         limit = self._device.limits["max-storage-buffer-binding-size"]
@@ -45,22 +45,32 @@ class Scatter:
         encoder.clear_buffer(scattered["buffer"], 0, size)
         return scattered
 
-    def encode(self, encoder, inputs, index: int, surfaces, candidates, tiles, scattered) -> None:
+    def encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        inputs: Inputs,
+        index: int,
+        surfaces: tuple[View, View],
+        candidates: View,
+        tiles: gpu.BufferPart,
+        scattered: gpu.BufferPart,
+    ) -> None:
         """Record the scatter of frame `index` of the inputs from `tiles`, if it is no farther than
         a neighbour; `surfaces`: the front surfaces of the frame itself, and of that frame."""
         if index >= len(_near(inputs)):
             return
         kernel = gpu.kernel(self._device, "methods/gather/tiles/scatter.wgsl")
-        data = np.zeros((), kernel.source.dtype("ScatteredFrame"))
-        data["offset"], data["index"] = inputs.frames[index].offset, index
-        data["count"] = len(_near(inputs))
         own, front = surfaces
         kernel.run(
             encoder,
             "main",
             inputs.bindings,
             tiles,
-            source=uniform(self._device, "source", data),
+            source={
+                "offset": inputs.frames[index].offset,
+                "index": index,
+                "count": len(_near(inputs)),
+            },
             front_surface=front,
             own_surface=own,
             tile_candidates=candidates,
@@ -69,6 +79,6 @@ class Scatter:
         )
 
 
-def _near(inputs) -> list:
+def _near(inputs: Inputs) -> list[PreparedFrame]:
     """The frame and its neighbours, which come first."""
     return [frame for frame in inputs.frames if abs(frame.offset) <= 1]
