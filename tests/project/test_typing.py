@@ -1,8 +1,10 @@
 """Type checkers find a typo in a user's program, and accept what is right."""
 
+import ast
 import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import get_args, get_type_hints
 
 import pytest
@@ -84,3 +86,40 @@ def test_keywords_are_the_options_of_the_methods():
         assert choices or {hint} == {option.kind for option in same}, name
     assert set(PASSES) - {"to_next"} <= set(get_type_hints(FrameKeywords))
     assert set(get_type_hints(PictureKeywords)) < set(get_type_hints(VideoKeywords))
+
+
+ROOT = Path(__file__).parents[2]
+STRICT = "gpu", "gpu_frame", "methods", "pipeline"
+MOST_PARAMETERS = 8
+PUBLIC = {"encode in pipeline/blur.py"}  # the views of five frames, each by its name
+
+
+def crowded(text: str) -> list[str]:
+    """Functions with more than MOST_PARAMETERS parameters, constructors left out."""
+    return [
+        node.name
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef) and node.name != "__init__"
+        and len({a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
+                - {"self", "cls"}) > MOST_PARAMETERS
+    ]  # fmt: skip
+
+
+@pytest.mark.fast
+def test_functions_that_record_passes_take_few_parameters():
+    found = {
+        f"{name} in {path.relative_to(ROOT / 'wgmb').as_posix()}"
+        for folder in STRICT
+        for path in (ROOT / "wgmb" / folder).rglob("*.py")
+        for name in crowded(path.read_text("utf-8"))
+    }
+    assert found == PUBLIC
+    nine = ", ".join("abcdefghi")
+    assert crowded(f"def f({nine}): ...\ndef g(self, {nine[3:]}): ...\n") == ["f"]
+
+
+@pytest.mark.fast
+def test_the_type_checker_asks_for_every_parameter_of_passes():
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    relaxed = set(re.findall(r'root = "wgmb/(\w+)", reportMissingParameterType = false', text))
+    assert not relaxed & set(STRICT)

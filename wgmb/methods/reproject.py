@@ -108,9 +108,11 @@ class Reproject:
             COUNTS=self._options.show == "count",
             FIVE_POSITIONS=len(sources) > 1,
         )
+        # Paths through five positions, where there are neighbours to lead on.
         bends: list[View | None] = [None]
         if len(sources) > 1:
             bends = [*self._bends.encode(encoder, inputs, sources)]
+        # As many slices at once as the buffers of depths may hold.
         width, height = inputs.bindings.size
         pixels = width * height
         bits = kernel.source.integer("BLOCK_BITS")
@@ -152,6 +154,8 @@ class Reproject:
                 **shared,
             )
 
+        # In each slice a pixel shows the nearest of the frame's own samples. Only pixels that it
+        # leaves open are filled from the neighbours.
         encoder.clear_buffer(shared["means"])
         encoder.clear_buffer(shared["counts"])
         for first in range(0, inputs.samples, most):
@@ -174,6 +178,7 @@ class Reproject:
                 "facing needs the cameras of this and the previous frame with view_from_world, "
                 "and no vectors"
             )
+        # The paper's samples are those of this frame and of the previous one.
         prev = [n for n in inputs.frames[1:] if n.offset == -1]
         normals = inputs.frame.normal is not None and all(n.normal is not None for n in prev)
         kernel = gpu.kernel(
@@ -188,6 +193,7 @@ class Reproject:
             NORMALS=normals,
             NEAREST_ONLY=self._options.depth_test,
         )
+        # A link is a pixel and a step in 32 bits, which bounds the steps that are done together.
         width, height = inputs.bindings.size
         bits = (width - 1).bit_length(), (width - 1).bit_length() + (height - 1).bit_length()
         rows = kernel.source.integer("ROWS")
@@ -215,8 +221,8 @@ class Reproject:
             table = np.zeros(rows, kernel.source.dtype("Step"))
             table["time"][: len(steps)] = steps
             if camera and pair:
-                chunk |= _steps_between(replace(camera, here=pair[0], prev=None, next=pair[1]),
-                               inputs.bindings.size, np.abs(steps), table)  # fmt: skip
+                way = replace(camera, here=pair[0], prev=None, next=pair[1])
+                chunk |= _steps_between(way, inputs.bindings.size, np.abs(steps), table)
             kernel.run(
                 encoder,
                 entry,
@@ -231,6 +237,7 @@ class Reproject:
                 **shared,
             )
 
+        # This frame's samples go back to the previous camera, and the previous frame's go ahead.
         sources = [inputs.frame, *prev]
         shares = np.linspace(0, 1, inputs.samples) if inputs.samples > 1 else np.zeros(1)
         jobs = []
@@ -238,6 +245,7 @@ class Reproject:
             times = (-1, 1)[k] * np.append(shares, shares[-1])  # what is one too many ends a line
             for i in range(0, inputs.samples, most):
                 jobs.append((source, times[i : i + most + 1], pairs[k] if pairs else None))
+        # Points are linked to lists, which are summed chunk by chunk; lines need no lists.
         if self._options.splat == "line":
             run("resolve", sources[0], shares[:0], None, True, False)
         for i, (source, steps, pair) in enumerate(jobs):

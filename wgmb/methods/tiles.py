@@ -82,11 +82,13 @@ class Tiles:
         velocity = gpu.kernel(
             self._device, "methods/tiles_velocity.wgsl", HAS_DEPTH=inputs.frame.depth is not None
         )
+        # Tiles are those of the display window, so that a crop has the same ones.
         width, height = inputs.bindings.size
         left, top, _, display_height = inputs.bindings.window
         edge = edge_of(display_height)
         first = left // edge, top // edge
         count = -(-(left + width) // edge) - first[0], -(-(top + height) // edge) - first[1]
+        # Taps read velocity and depth many times, so both are in one texture.
         velocity_depth = self._images.view("velocity, depth", (width, height), "rgba32float")
         velocity.run(
             encoder,
@@ -108,6 +110,7 @@ class Tiles:
             "neighbor_max": self._neighbor_max.at_least(16 * count[0] * count[1]),
             "output": output,
         }
+        # The fastest motion of each tile, by rows first, and of the tiles around it; then the taps.
         grids = {
             "find_row_max": (count[0], height),
             "find_tile_max": count,

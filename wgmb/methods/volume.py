@@ -67,6 +67,7 @@ class Volume:
 
     def _volumes(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         on_gpu, shutter = inputs.scene, inputs.shutter
+        # The shader loops over the orbiting spheres, then over the tori.
         volumes, backdrop = on_gpu.original.instant(on_gpu.time)
         volumes = [v for v in volumes if v.opacity or v.facing]
         volumes.sort(key=lambda v: isinstance(v, Torus))
@@ -90,6 +91,7 @@ class Volume:
             "tables": gpu.constant(self._device, "tables", tabled, usage),
             "output": output,
         }
+        # Most tiles show only the backdrop: those with a cloud or a shadow have their own kernels.
         edges = source.integer("WG_X"), source.integer("WG_Y")
         kinds = tile_kinds(data, len(rotations), on_gpu.size, edges)
         row = source.integer("TILES_A_ROW")

@@ -190,6 +190,7 @@ class Blur:
         size, output, confidence = frame.size, view_of(output), view_of(confidence)
         around = {"": (0, frame)}
         near = {"prev.": (-1, prev), "next.": (1, next)}
+        # Those beyond a neighbour count only with it, and only if the method reaches so far.
         near |= {"prev.prev.": (-2, prev and prev_prev), "next.next.": (2, next and next_next)}
         reach = reach_of(self.method)
         around |= {w: (o, f) for w, (o, f) in near.items() if f is not None and abs(o) <= reach}
@@ -204,6 +205,7 @@ class Blur:
         encoder = timing.watch(encoder) if timing else encoder
         frames = self._prepared.frames(encoder, bindings, list(around.values()))
         inputs = self._inputs(bindings, number, frames=frames)
+        # Without holdouts the method writes the output itself; else they are put back into it.
         if inputs.frame.weight is None:
             self._record(encoder, inputs, output, confidence)
             return

@@ -109,10 +109,12 @@ class Gather:
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record layers and tile motions of every frame, then the search."""
         size, frames = inputs.bindings.size, inputs.frames
+        # Taps fill the whole picture where only edges of motion are searched, which come over them.
         if self._taps is not None:
             self._taps.encode(encoder, inputs, output)
         worklists = self._tiles.encode(encoder, inputs)
         self._layers.encode(encoder, inputs, worklists)
+        # Where searches start: from few motions a tile, and in crowded tiles from scattered pixels.
         candidates = self._motions.candidates(size, len(frames))
         scattered = self._scatter.scattered(encoder, inputs)
         for i in range(len(frames)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
 
@@ -28,7 +29,7 @@ def kinds_of(inputs: Inputs, shading: Shading) -> list[Kind]:
         *_kind(inputs, *PAIRS[0], False),
         *_kind(inputs, *PAIRS[1], True),
     ]
-    if shading == "passes" and not any(_has(inputs.frame, *pair) for pair in PAIRS):
+    if shading == "passes" and not any(_has(inputs.frame, pair) for pair in PAIRS):
         raise InputError(
             '`shading` "passes" needs passes of light: diffuse_light and diffuse_color, or '
             "glossy_light and glossy_color"
@@ -47,7 +48,7 @@ def _kind(inputs: Inputs, light: str, color: str | None, pulled: bool) -> list[K
     return [Kind(pulled, there, albedo, by_color=color is None)]
 
 
-def _has(frame: PreparedFrame, *names: str) -> bool:
+def _has(frame: PreparedFrame, names: Iterable[str]) -> bool:
     return all(getattr(frame, name) is not None for name in names)
 
 

@@ -40,6 +40,7 @@ class Search:
         The static cells of `worklists` are copied, if there are any.
         `starts`: of searches, the tiles' candidates and what is scattered. `added`: moving light.
         """
+        # All passes of the search read the layers and the starts of the same frames.
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]
         far = [frame.offset for frame in inputs.frames[len(near) :]]
         array = partial(self._images.view_of, dimension="2d-array")
@@ -61,6 +62,7 @@ class Search:
             "FAR": bool(far),
             "WEIGHTED": inputs.frame.weight is not None,
         }
+        # Blocks with one layer need no search through two, which most of them do not.
         active = worklists["active"]
         mask, lists = self._classify(encoder, inputs, active, shared, added, timed)
         differences = self._differences(encoder, inputs, layers["surfaces"], worklists["separated"])

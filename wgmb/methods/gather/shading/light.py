@@ -176,6 +176,7 @@ class MovingLight:
         earlier: wgpu.GPUTexture | None,
     ) -> wgpu.GPUTexture:
         """Record the layers of one kind, added to the `earlier` ones."""
+        # Darkness of shadows, or levels of reflections, in all frames, and its flow between them.
         present = values(stage, kind.frames[0], changed, kind.by_color)
         seen = {offset: (view, pyramid(stage, str(offset), view))
                 for offset, view in present.items()}  # fmt: skip
@@ -188,6 +189,7 @@ class MovingLight:
         found = flows(stage, seen, changed, surfaces, kind.by_color)
         if not stage.pulled:
             _carry(stage, present[0], found, times)
+        # A layer for each node, and two for the light of the neighbours themselves.
         result = self._images.texture(
             f"light {stage.name}", stage.size, "rgba16float", times.count + 2
         )
