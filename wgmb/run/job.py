@@ -128,8 +128,7 @@ class Job:
             clip.expand_highlights(expansion.white)
         files = self.make_output(None if numbers is None else clip)
         request = self.request
-        how = request.confidence, request.conversion, road
-        return Run(clip, blur, files, self._resumes, *how)
+        return Run(clip, blur, files, self._resumes, request.confidence, request.conversion, road)
 
     def _road(self, clip: Clip, blur: Blur) -> PictureRoad | None:
         """The choices for frames without vectors; None where each is blurred by itself."""

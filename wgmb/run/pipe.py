@@ -43,6 +43,16 @@ Reader = Y4mReader | StreamReader
 
 
 @dataclass(frozen=True)
+class StreamHints:
+    """Facts that a user states of a stream of pictures, which may not state them itself."""
+
+    fps_in: str | None = None
+    """Pictures a second of a stream that states none, or another rate than it states."""
+    color_in: str | None = None
+    """Its colours, a name in COLORS."""
+
+
+@dataclass(frozen=True)
 class _Source:
     """The input: its exposures, and facts for the output."""
 
@@ -81,16 +91,14 @@ def blur_pipe(
     *,
     stdout: BinaryIO | None = None,
     device: str | None = None,
-    fps_in: str | None = None,
-    color_in: str | None = None,
+    hints: StreamHints = StreamHints(),
     tell: Callable[[str], None] = lambda text: None,
     progress: Callable[[int, str], None] | None = None,
 ) -> VideoReport:
     """Blur from a pipe, into a pipe, or both; the other end is a video's file.
 
-    `stdout`: the unbuffered stream that STDOUT stands for. `fps_in`: pictures a second of a stream
-    that does not say, or another rate than it says. `color_in`: its colours (COLORS). `tell` is
-    called with lines that a user should know. InputError for settings that a pipe cannot have.
+    `stdout`: the unbuffered stream that STDOUT stands for. `tell` is called with lines that a user
+    should know. InputError for settings that a pipe cannot have.
     """
     _check(source, output, request)
     encoding, begun = _encoding(output, request.video), time.perf_counter()
@@ -98,10 +106,12 @@ def blur_pipe(
         reader = None
         if is_pipe(source):  # before the GPU: an empty stream is told at once
             stream = stack.enter_context(_input(source))
-            reader = reader_of(stream, _plain(source), request, fps_in, color_in)
+            reader = reader_of(stream, _plain(source), request, hints)
         run = request.open(device)
         tell(f"motion: {run.how}")
-        found = _piped(reader, run, output, fps_in) if reader else _of_file(source, run, output)
+        found = (
+            _piped(reader, run, output, hints.fps_in) if reader else _of_file(source, run, output)
+        )
         for text in found.notes:
             tell(f"{_plain(source)}: {text}")
         writer = _writer(output, found, encoding, stack, stdout)
@@ -165,8 +175,7 @@ def reader_of(
     stream: BinaryIO,
     name: str,
     request: VideoRequest,
-    fps_in: str | None = None,
-    color_in: str | None = None,
+    hints: StreamHints = StreamHints(),
 ) -> Reader:
     """The reader for what comes through a buffered stream; see blur_pipe."""
     most = request.input.max_mb
@@ -174,9 +183,11 @@ def reader_of(
     if not beginning:
         raise InputError(f"{name}: holds no pictures")
     if _Y4M.startswith(beginning):
-        return Y4mReader(stream, name, color_in, most)
+        return Y4mReader(stream, name, hints.color_in, most)
     pause = request.video.longest_pause
-    return StreamReader(stream, name, color_in, most, keeps_time=not fps_in, pause=pause)
+    return StreamReader(
+        stream, name, hints.color_in, most, keeps_time=not hints.fps_in, pause=pause
+    )
 
 
 def _input(source: str) -> BinaryIO:

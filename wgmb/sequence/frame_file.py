@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -190,7 +190,7 @@ def odd_sizes(sizes: dict[int, tuple[int, int]]) -> str | None:
 
 
 @contextlib.contextmanager
-def about(name: str | Path):
+def about(name: str | Path) -> Iterator[None]:
     """Name the file in errors that do not."""
     try:
         yield

@@ -224,12 +224,12 @@ def _take_pipe(call: BlurCall) -> int:
     if len(call.patterns) > 1:
         raise InputError(_ALONE)
     with needed_by("a pipe", "video"):
+        from ...run.pipe import StreamHints
         from ...run.video import VideoRequest
         from .blur_pipe import blur_pipe
     request = VideoRequest.of(call.groups)
-    return blur_pipe(
-        pattern, output, request, call.console, call.adapter, call.fps_in, call.color_in
-    )
+    hints = StreamHints(call.fps_in, call.color_in)
+    return blur_pipe(pattern, output, request, call.console, hints, call.adapter)
 
 
 def _take_videos(call: BlurCall) -> int:

@@ -10,6 +10,7 @@ from typing import BinaryIO
 
 from ...errors import InputError, counted
 from ...io.pipes import STDIN, STDOUT
+from ...run.pipe import StreamHints
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
@@ -23,9 +24,8 @@ def blur_pipe(
     output: OutputSettings,
     request: VideoRequest,
     console: Console,
+    hints: StreamHints,
     adapter: str | None = None,
-    fps_in: str | None = None,
-    color_in: str | None = None,
 ) -> int:
     """Blur from or into a pipe; returns the exit code."""
     if source == STDIN and os.isatty(0):
@@ -34,8 +34,8 @@ def blur_pipe(
 
     with _stdout(output.output) as stdout:
         report = run(
-            source, output, request, stdout=stdout, device=adapter, fps_in=fps_in,
-            color_in=color_in, tell=console.say, progress=check,
+            source, output, request, stdout=stdout, device=adapter, hints=hints,
+            tell=console.say, progress=check,
         )  # fmt: skip
     console.say(*pictures_told(report, request.video.duplicates == "fill"))
     where = "stdout" if output.output == STDOUT else output.output
