@@ -81,7 +81,7 @@ class Dis:
         assert found is not None
         back = -found if back is None else back  # a path goes on as on its other side
         ahead = -found if ahead is None else ahead
-        return np.concatenate([back, ahead], axis=2)
+        return self._cv2.merge([back, ahead])
 
     def _way(self, here: np.ndarray, other: np.ndarray) -> np.ndarray:
         height, width = here.shape
