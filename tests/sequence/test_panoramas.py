@@ -5,6 +5,7 @@ import pytest
 
 import wgmb
 from make_frames import add_attributes, write_exr
+from wgmb.flow.dis import Dis
 from wgmb.sequence import panorama
 from wgmb.sequence.layers.passes import Passes
 
@@ -70,6 +71,27 @@ def test_a_body_over_the_seam_is_as_right_as_one_in_the_middle(tmp_path, method)
     assert error[1] < 1.05 * error[0], error
     flat, _ = _blurred(pattern, method, wrap="off")
     assert np.sqrt(np.mean((np.roll(flat, 128, axis=1) - truth) ** 2)) > 1.5 * error[1]
+
+
+def test_motion_that_is_searched_crosses_the_seam(tmp_path):
+    """The share of the disc whose motion is found to both sides, to a tenth of its speed."""
+    right = []
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    for name, centre, wrap in (("middle", 128, "on"), ("seam", 0, "auto"), ("off", 0, "off")):
+        (tmp_path / name).mkdir()
+        for number in (9, 10, 11):
+            rgb, disc = _picture(number, centre)
+            across = (x - centre - SPEED * (number - 10) + WIDTH / 2) % WIDTH - WIDTH / 2
+            spots = np.sin(0.004 * across**2 + 0.3 * y) * np.cos(0.2 * across - 0.003 * y**2)
+            rgb = np.where(disc[..., None], 0.5 + 0.45 * spots[..., None], 0.3 * rgb)
+            channels = {c: rgb[..., i].astype("f4") for i, c in enumerate("RGB")}
+            write_exr(tmp_path / name / f"s.{number:04}.exr", channels)
+        clip = wgmb.Clip(tmp_path / name / "s.####.exr", passes=Passes(wrap=wrap))
+        clip.move_by(Dis("best"))
+        motion = clip.frame(clip.source(10)).motion
+        off = np.abs(motion[..., ::2] - (-SPEED, SPEED)).max(axis=2)
+        right.append(float((off[_picture(10, centre)[1]] < SPEED / 10).mean()))
+    assert right[1] > 0.7 * right[0] > 0.6 and right[2] < 0.3, right
 
 
 @pytest.mark.fast

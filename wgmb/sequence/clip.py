@@ -191,7 +191,9 @@ class Clip:
 
     def move_by(self, motion: MotionSource | None) -> None:
         """Find motion in the pictures (see wgmb/flow) if the files hold none; None: all stand."""
-        self.builder.picture_motion = PictureMotion(self.cache, motion) if motion else standing
+        around = self._neighbours.goes_around
+        found = PictureMotion(self.cache, motion, around) if motion else standing
+        self.builder.picture_motion = found
         self.cache.margin = 0  # a source of motion widens it
         self._neighbours.forget_all()
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import InputError
 from ..shots.cuts import pictures_differ
 from ..shots.motion import Found, MotionSource, ShotMotion
+from . import panorama
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
@@ -22,11 +25,14 @@ def standing(source: FrameFile) -> Found:
 class PictureMotion:
     """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
 
-    A frame's motion depends on pictures of its own shot alone, and of its own data window.
+    A frame's motion depends on pictures of its own shot alone, and of its own data window. Motion
+    of a picture that `goes_around` is found across its left and right edge, too.
     """
 
-    def __init__(self, stored: FrameCache, motion: MotionSource):
-        self._stored, self._motion = stored, motion
+    def __init__(
+        self, stored: FrameCache, motion: MotionSource, goes_around: Callable[[FrameFile], bool]
+    ):
+        self._stored, self._motion, self._goes_around = stored, motion, goes_around
         self._cuts: dict[tuple[int, str | None], bool] = {}
         self._views: dict[str | None, ShotMotion] = {}
 
@@ -41,11 +47,19 @@ class PictureMotion:
                 lambda number: self._picture(number, view),
                 lambda a, b: self._same_shot(a, b, view),
             )
-        return self._views[view](number)
+        found = self._views[view](number)
+        if found is None or not self._goes_around(source):
+            return found
+        room = panorama.room(width)
+        motion, depth = (None if a is None else a[:, room : room + width] for a in found)
+        assert motion is not None
+        return np.ascontiguousarray(motion), None if depth is None else np.ascontiguousarray(depth)
 
     def _picture(self, number: int, view: str | None) -> np.ndarray | None:
         source = self._source(number, view)
-        return None if source is None else source.rgba
+        if source is None:
+            return None
+        return panorama.widened(source.rgba) if self._goes_around(source) else source.rgba
 
     def _same_shot(self, a: int, b: int, view: str | None) -> bool:
         """True if no cut lies between two frames; frames far apart count as different shots."""

@@ -429,10 +429,13 @@ def _other_layers(frame: FrameFile) -> list[str]:
     ]  # fmt: skip
     if not others:
         return []
-    name, have = taken or "without a name", "have" if others[1:] else "has"
+    name, which = taken or "without a name", ", ".join(others)
+    alike = "have vectors too, and stay as they are" if others[1:] else (
+        "has vectors too, and stays as it is"
+    )  # fmt: skip
     return [
-        f"the layer {name} is blurred; {', '.join(others)} {have} vectors too, and stays as it is: "
-        f"`color={others[0]}` blurs it in a run of its own"
+        f"the layer {name} is blurred; {which} {alike}: `color={others[0]}` blurs "
+        f"{'that one' if others[1:] else 'it'} in a run of its own"
     ]
 
 

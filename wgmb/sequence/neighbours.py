@@ -311,20 +311,28 @@ class Neighbours:
             return False
         if wrap == "on":
             return True
-        if panorama.is_stated(source):
-            reason = "its attribute envmap says so"
-        elif not panorama.has_shape(source):
-            return False
-        elif self.is_joined:
-            reason = "2:1, and its left edge goes on where the right one ends"
-        elif panorama.crosses(frame.motion):
+        reason = self._what_joins(source)
+        if not reason and panorama.has_shape(source) and panorama.crosses(frame.motion):
             reason = "2:1, and vectors are longer than half its width"
-        else:
+        if not reason:
             return False
         text = f"is taken as a panorama of 360 degrees ({reason}); `wrap='off'` takes it as flat"
         if source.number not in (on := self._stored.notes.setdefault(text, [])):
             on.append(source.number)
         return True
+
+    def goes_around(self, source: FrameFile) -> bool:
+        """True if the edges of a picture are one meridian, as far as the picture itself tells."""
+        wrap, is_whole = self._stored.passes.wrap, source.data_window == source.display_window
+        return is_whole and (wrap == "on" or (wrap == "auto" and bool(self._what_joins(source))))
+
+    def _what_joins(self, source: FrameFile) -> str:
+        """The reason to join the edges of a picture, apart from its motion; '' for none."""
+        if panorama.is_stated(source):
+            return "its attribute envmap says so"
+        if panorama.has_shape(source) and self.is_joined:
+            return "2:1, and its left edge goes on where the right one ends"
+        return ""
 
     def _wraps(self, frames: Mapping[int, tuple[FrameFile, Frame]]) -> bool:
         """True if the frames, by their offset, are to be read around their edges."""

@@ -67,6 +67,18 @@ def shortest(frame: Frame) -> Frame:
     return replace(frame, motion=motion)
 
 
+def room(width: int) -> int:
+    """Columns beyond either edge in which motion is searched: a quarter of the width."""
+    return -(-width // 4)
+
+
+def widened(picture: np.ndarray) -> np.ndarray:
+    """The picture (height, width, ...) with `room` beyond its sides, read around them."""
+    width = picture.shape[1]
+    columns = np.arange(-room(width), width + room(width))
+    return np.take(picture, columns % width, axis=1)
+
+
 def canvas(display: Window, boxes: list[Box]) -> Window:
     """The window with room beyond its left and right edge for content that reaches `boxes`.
 
