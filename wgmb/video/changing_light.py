@@ -103,7 +103,6 @@ class ChangingLight:
         """
         picture_size, indices = surroundings.motion.size, surroundings.indices
         size, step = _small_size(picture_size), step_of(picture_size)
-        none = self._images.view("none", (1, 1), "r32float")
         sums = self._sums.at_least(_TEXEL * size[0] * size[1])
         here = self._reduced(encoder, indices[1], picture)
         if not (any(shares) or begins):
@@ -114,16 +113,6 @@ class ChangingLight:
             here if index is None else self._reduced(encoder, index, picture)
             for index in indices[::2]
         )
-        light = gpu.uniform(
-            self._device,
-            f"{_FOLDER}/change.wgsl",
-            "Light",
-            factors=surroundings.factors,
-            shares=part * np.array(shares),
-            exist=[index is not None for index in indices[::2]],
-            begins=begins,
-            whole=part == 1,
-        )
         self._near = self._none
         if part == 1:
             before, after = (indices[1] if i is None else i for i in indices[::2])
@@ -132,13 +121,19 @@ class ChangingLight:
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, size),
-            light=light,
+            light={
+                "factors": surroundings.factors,
+                "shares": part * np.array(shares),
+                "exist": [index is not None for index in indices[::2]],
+                "begins": begins,
+                "whole": part == 1,
+            },
             here=here,
             previous=previous,
             next=next,
             linear=self._linear,
             motion=surroundings.motion,
-            holdout=surroundings.holdout or none,
+            holdout=surroundings.holdout,
             sums={"buffer": sums, "offset": 0, "size": sums.size},
             changes=self._images.view("changes", size, self._texel),
             standing=self._images.view("standing", size, self._texel),

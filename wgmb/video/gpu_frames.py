@@ -169,7 +169,7 @@ class VideoFrames:
             encoder,
             "main",
             gpu.FrameBindings.of_size(self._device, size),
-            pace=gpu.uniform(self._device, file, "Pace", factors=np.repeat(factors, 2)),
+            pace={"factors": np.repeat(factors, 2)},
             motion=motion.create_view(),
             output=output.create_view(),
         )

@@ -151,7 +151,7 @@ class Planes:
             encoder,
             "main",
             gpu.FrameBindings.of_size(self.device, (coarse.words, coarse.size[1])),
-            planes=gpu.constant(self.device, "planes", data),
+            planes=data,
             packed=self._packed.buffer(places),
             **given,
         )

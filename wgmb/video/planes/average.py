@@ -93,7 +93,7 @@ class Average:
             ),
             stored=reading(self._device, stored),
             wanted=writing(self._device, wanted),
-            average=self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM),
+            average=data,
             lumas=planes[0].create_view(dimension="2d-array"),
             blues=planes[1].create_view(dimension="2d-array"),
             reds=planes[2].create_view(dimension="2d-array"),
