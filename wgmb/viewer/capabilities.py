@@ -72,7 +72,7 @@ class Choices:
             clip = coming[1]
         else:
             clip = ClipSubject(self._device, state, self.displayed.display(state))
-        assert clip.finding  # what cannot be read is not opened
+        _ = clip.finding  # what cannot be read is not opened
         return clip
 
     def _close_but(self, keys: Collection[tuple]) -> None:
