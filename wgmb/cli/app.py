@@ -29,7 +29,7 @@ from ..errors import (
 )
 from ..extras import EXTRAS, reason
 from ..interpreter import handle_signals
-from . import interruption, terminal
+from . import interruption, run_log, terminal
 from .exit_codes import (
     DONE,
     INTERRUPTED,
@@ -38,6 +38,7 @@ from .exit_codes import (
     USAGE,
 )
 from .help import IN_FULL, MAIN, CommandHelp
+from .spelling import as_options
 from .streams import named
 
 COMMANDS = {
@@ -105,6 +106,13 @@ def main(arguments: list[str] | None = None) -> int:
     terminal.own_streams()
     terminal.interrupted.clear()
     words = named(sys.argv[1:] if arguments is None else arguments)
+    code = _code(words)
+    run_log.end(code)
+    return code
+
+
+def _code(words: list[str]) -> int:
+    """Run a command; what fails is an error in one line, and an exit code."""
     try:
         handle_signals(terminal.interrupt)
         warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
@@ -290,6 +298,7 @@ def _check_tables(tables: dict[str, object], command: str) -> None:
 
 def _say_why(text: str, code: int) -> int:
     terminal.complain(text)
+    run_log.end(code, as_options(text))
     return code
 
 

@@ -224,6 +224,14 @@ PerceivedOutputs = Annotated[PerceivedOutputOptions, Parameter(name="*", group=O
 Confidence = Annotated[bool, Parameter(group=OUTPUT)]
 ConfigFile = Annotated[Path | None, Parameter(name="--config", group=RUN)]
 Adapter = Annotated[str | None, Parameter(group=RUN)]
+LogJson = Annotated[
+    str | None,
+    Parameter(
+        help="File to which lines of JSON are added, for the run's start, each frame and its end; "
+        "- is standard output.",
+        group=RUN,
+    ),
+]
 Verbose = Annotated[bool, Parameter(alias="-v", group=RUN)]
 Quiet = Annotated[bool, Parameter(alias="-q", group=RUN)]
 SceneName = Annotated[str, Parameter(help=f"Scene: {', '.join(builtin.SCENES)}.")]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..io.pipes import STDIN, STDOUT
 
-_OUTPUTS = "-o", "--output"
+_OUTPUTS = "-o", "--output", "--log-json"
 
 
 def named(words: Sequence[str]) -> list[str]:
@@ -15,5 +15,6 @@ def named(words: Sequence[str]) -> list[str]:
     for before, word in zip(["", *words], words, strict=False):
         if word == "-":
             word = STDOUT if before in _OUTPUTS else STDIN
-        found.append(f"--output={STDOUT}" if word == "--output=-" else word)
+        option, _, value = word.partition("=")
+        found.append(f"{option}={STDOUT}" if option in _OUTPUTS and value == "-" else word)
     return found

@@ -18,7 +18,7 @@ from typing import Any, Literal, Protocol, TypeVar
 from .. import gpu
 from ..errors import Error, reason
 from ..threads import Behind, Stop, ahead
-from .report import BatchReport, Progress
+from .report import BatchReport, Failure, Progress
 
 HOPELESS = 3  # frames one after the other that cannot be written for the same reason
 ON_REQUEST = "on request"  # why a run stopped whose `stop` was set
@@ -220,7 +220,7 @@ class _Run:
 
     def _fail(self, number: int, why: str) -> None:
         self._report.failed[number] = why
-        self._tell(number, "failed")
+        self._tell(number, Failure(why))
 
     def _give_up(self, why: str) -> None:
         """End the run where the next frames will fail for the same reason."""

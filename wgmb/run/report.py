@@ -11,7 +11,20 @@ from ..io.frame_numbers import frame_list
 from ..sequence.clip import Clip
 
 Progress = Callable[[int, str], None]
-"""Called with a frame's number and "done", "skipped" or "failed"."""
+"""Called with a frame's number and "done", "skipped" or "failed", which is a Failure."""
+
+
+class Failure(str):
+    """The state "failed", as progress is called with it, and the reason."""
+
+    reason: str
+
+    def __new__(cls, reason: str) -> Failure:
+        """A state with this reason."""
+        made = super().__new__(cls, "failed")
+        made.reason = reason
+        return made
+
 
 MOST_ROWS = 20  # of a report in a notebook, of a kind
 

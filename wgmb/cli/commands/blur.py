@@ -18,6 +18,7 @@ from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
 from ...settings.color import ColorSettings, option_name
 from ...settings.groups import SettingsGroups
+from .. import run_log
 from ..console import Console
 from ..help import INPUT, RUN, VIDEO
 from ..names import is_batch
@@ -30,6 +31,7 @@ from ..options import (
     FrameBlurs,
     InputOptions,
     Inputs,
+    LogJson,
     OutputOptions,
     Outputs,
     Quiet,
@@ -43,7 +45,7 @@ from .blur_frames import Crew, blur_frames, blur_job, blur_on_farm
 
 NOT_WITH_JOB = (
     "--job holds all settings, and frames that are done are kept; only --frames, --workers, "
-    "--cluster, --adapter, --verbose and --quiet can be combined with it"
+    "--cluster, --adapter, --log-json, --verbose and --quiet can be combined with it"
 )
 
 
@@ -67,6 +69,7 @@ def blur(
     confidence: Confidence = False,
     config: ConfigFile = None,
     adapter: Adapter = None,
+    log_json: LogJson = None,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> int:
@@ -120,6 +123,7 @@ def blur(
     quiet
         Print errors only.
     """
+    run_log.begin(log_json, "blur", output.output if output else "")
     groups = SettingsGroups(blur=blur, shutter=shutter, input=input, color=color, video=video)
     call = BlurCall(
         patterns,

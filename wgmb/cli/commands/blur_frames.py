@@ -10,6 +10,7 @@ from typing import NamedTuple
 from ...io.frame_numbers import frame_numbers
 from ...run.job import Job
 from ...run.job_file import read_job
+from .. import run_log
 from ..console import Console
 from ..terminal import check, muted
 
@@ -48,10 +49,12 @@ def blur_on_farm(job: Job, crew: Crew, console: Console, adapter: str | None = N
     farm = Farm(crew.cluster, crew.workers, adapter, loud.say, console.detail, check)
     job = as_farm_job(job)
     started = time.perf_counter()
+    output = job.request.output.output
+    run_log.start([job.request.pattern], output, job.settings, len(job.numbers))
     with console.progress(len(job.numbers)) as tick, muted():
-        report = farm.blur(job, tick)
+        report = farm.blur(job, run_log.logged(tick, output))
     took = f"{time.perf_counter() - started:.1f} s with {job.request.blur.method}"
-    return console.conclude(report, Path(job.request.output.output), took)
+    return console.conclude(report, Path(output), took)
 
 
 def blur_frames(
@@ -63,10 +66,12 @@ def blur_frames(
     console.detail(f"adapter: {run.blur.device.adapter.summary}")
     console.detail(f"settings: {run.output.settings}")
     started = time.perf_counter()
+    output = run.output.pattern
+    run_log.start([job.request.pattern], output, job.settings, len(run.numbers))
     with console.progress(len(run.numbers)) as tick:
-        report = run(tick)
+        report = run(run_log.logged(tick, output))
     if len(run.clip.numbers) < len(job.numbers):
         report.unseen += report.absent  # other frames may have them
         report.lacking = []
     took = f"{time.perf_counter() - started:.1f} s with {run.blur.method.name}"
-    return console.conclude(report, run.output.pattern, took)
+    return console.conclude(report, output, took)

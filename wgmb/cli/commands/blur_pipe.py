@@ -14,6 +14,8 @@ from ...run.pipe import StreamHints
 from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
+from ...settings.record import record
+from .. import run_log
 from ..console import Console, pictures_told
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import check
@@ -32,10 +34,12 @@ def blur_pipe(
         raise InputError("standard input is a terminal; pipe pictures into it, such as: "
                          "ffmpeg -i in.mp4 -f yuv4mpegpipe - |")  # fmt: skip
 
+    settings = record(request.blur, request.shutter, request.video)
+    run_log.start([source], output.output, settings, None)
     with _stdout(output.output) as stdout:
         report = run(
             source, output, request, stdout=stdout, device=adapter, hints=hints,
-            tell=console.say, progress=check,
+            tell=console.say, progress=run_log.logged(check, output.output),
         )  # fmt: skip
     console.say(*pictures_told(report, request.video.duplicates == "fill"))
     where = "stdout" if output.output == STDOUT else output.output

@@ -22,6 +22,7 @@ from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
+from .. import run_log
 from ..console import Console, pictures_told, repeats_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
@@ -46,6 +47,7 @@ def blur_videos(
         plan = run.plan(patterns[0], output)
         tell_how(run, console)
         console.say(*(f"{patterns[0]}: {text}" for text in plan.notes))
+        run_log.start(patterns, output.output, run.settings, len(plan.wanted))
         if trial is not None:
             return _try_out(run, plan, trial, console)
         return _blur_alone(run, plan, console)
@@ -57,6 +59,7 @@ def blur_videos(
         _check_output(one, request.video)
     run = request.open(adapter)
     tell_how(run, console)
+    run_log.start(paths, output.output, run.settings, None)
     return _blur_each(run, paths, outputs, console)
 
 
@@ -75,7 +78,9 @@ def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
     losses = plan.losses
     console.say(*(f"{plan.name}: {text}" for text in losses))
     with console.progress(len(plan.wanted)) as tick:
-        report = run(plan, _estimated(tick, len(plan.wanted), run, console))
+        told = _estimated(tick, len(plan.wanted), run, console)
+        report = run(plan, run_log.logged_video(told, plan.name))
+    _log_end(report)
     console.say(*(f"{plan.name}: {text}" for text in report.left_out if text not in losses))
     if report.is_new:
         console.say(*pictures_told(report, run.request.video.duplicates == "fill"))
@@ -116,11 +121,13 @@ def _blur_each(
             plans.append(run.plan(path, output))
         except _FAILURES as error:
             plans.append(_reason(error, path))
+    names = [output.output for output in outputs]
     total = sum(len(plan.wanted) for plan in plans if isinstance(plan, VideoPlan))
     failed = 0
     with console.progress(total) as tick:
-        for plan in plans:
+        for path, name, plan in zip(paths, names, plans, strict=True):
             if isinstance(plan, str):
+                run_log.video(path, name, "failed", 0, plan)
                 console.complain(plan)
                 failed += 1
             else:
@@ -134,10 +141,13 @@ def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -
     path = plan.reader.path
     try:
         with share_of(tick, len(plan.wanted), f"{path.name}, frame") as tick_share:
-            report = run(plan, tick_share)
+            report = run(plan, run_log.logged_video(tick_share, plan.name))
     except _FAILURES as error:
-        console.complain(_reason(error, path))
+        why = _reason(error, path)
+        run_log.video(path, plan.name, "failed", 0, why)
+        console.complain(why)
         return False
+    _log_end(report)
     took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
     words = [took if report.is_new else "", *report.left_out, *report.notes]
     words += _remarks(report, run)
@@ -146,6 +156,12 @@ def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -
         console.complain(report.loss)
         return False
     return True
+
+
+def _log_end(report: VideoReport) -> None:
+    """Log a video that is there, with what was lost of it."""
+    status = "done" if report.is_new else "skipped"
+    run_log.video(report.path, report.output, status, report.seconds, report.loss)
 
 
 def _remarks(report: VideoReport, run: VideoRun) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,10 +21,11 @@ from ...scene import builtin
 from ...sequence.frame_file import is_video
 from ...settings import OutputSettings
 from ...settings.perception import PerceptionSettings
+from .. import run_log
 from ..console import Console, done_line
 from ..exit_codes import DONE, SOME_FAILED
 from ..help import MAIN
-from ..options import Adapter, InputOptions, Inputs, PerceivedOutputs, Quiet
+from ..options import Adapter, InputOptions, Inputs, LogJson, PerceivedOutputs, Quiet
 from ..terminal import out
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ def perceive(
     report: bool = False,
     speed: float | None = None,
     adapter: Adapter = None,
+    log_json: LogJson = None,
     quiet: Quiet = False,
 ) -> int:
     """Simulate a viewer's perception: each frame is held, and earlier ones fade.
@@ -70,9 +73,12 @@ def perceive(
     """
     console = Console(quiet)
     if report:
+        if log_json is not None:
+            raise InputError("--log-json is for frames and videos; --report makes none")
         if pattern is not None:
             raise InputError(f"--report takes no input, got {pattern!r}")
         return _report(output, perception, speed, console)
+    run_log.begin(log_json, "perceive", output.output)
     if pattern is None:
         raise InputError("perceive needs frames, a video, a scene, or --report")
     if speed is not None:
@@ -87,9 +93,11 @@ def perceive(
         video = perceive_video(pattern, output, input, perception, adapter)
         return _write_video(video, pattern, console)
     run = perceive_frames(pattern, output, input, perception, adapter)
+    files = run.output
+    run_log.start([pattern], files.pattern, json.loads(files.settings), len(run.frames.numbers))
     started = time.perf_counter()
     with console.progress(len(run.frames.numbers), "perceiving") as tick:
-        made = run(tick)
+        made = run(run_log.logged(tick, files.pattern))
     took = f"{time.perf_counter() - started:.1f} s"
     console.say(done_line(made, took, run.output.pattern))
     return DONE
@@ -98,9 +106,12 @@ def perceive(
 def _write_video(video: PerceivedVideo, path: str, console: Console) -> int:
     """Write a perceived video, and say so."""
     console.say(*(f"{path}: {text}" for text in video.reader.notes))
+    target = video.output.output
+    run_log.start([path], target, video.settings, len(video.wanted))
     with console.progress(len(video.wanted), "perceiving") as tick:
-        report = video(tick)
+        report = video(run_log.logged_video(tick, target))
     console.say(*(f"{report.output}: {text}" for text in report.left_out))
+    run_log.video(path, target, "done", report.seconds, report.loss)
     took = f"{report.seconds:.1f} s"
     console.say(f"{counted(report.frames, 'frame')} in {took} -> {report.output}")
     if report.loss:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 from ...run.scene import SceneRequest
 from ...settings.color import DisplaySettings
+from .. import run_log
 from ..console import Console, done_line
 from ..exit_codes import DONE
 from ..options import (
@@ -13,6 +15,7 @@ from ..options import (
     Confidence,
     ConfigFile,
     DisplayOptions,
+    LogJson,
     Outputs,
     Quiet,
     SceneBlurOptions,
@@ -39,6 +42,7 @@ def render(
     confidence: Confidence = False,
     config: ConfigFile = None,
     adapter: Adapter = None,
+    log_json: LogJson = None,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> int:
@@ -63,6 +67,7 @@ def render(
     quiet
         Print errors only.
     """
+    run_log.begin(log_json, "render", output.output)
     request = SceneRequest(
         scene=scene,
         output=output,
@@ -80,8 +85,10 @@ def render(
     console.detail(f"adapter: {run.render.blur.device.adapter.summary}")
     console.detail(f"settings: {run.output.settings}")
     started = time.perf_counter()
+    files = run.output
+    run_log.start([scene], files.pattern, json.loads(files.settings), run.frames.total)
     with console.progress(run.frames.total, "rendering") as tick:
-        report = run(tick)
+        report = run(run_log.logged(tick, files.pattern))
     took = f"{time.perf_counter() - started:.1f} s"
     console.say(done_line(report, took, run.output.pattern))
     return DONE

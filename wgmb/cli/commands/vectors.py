@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from typing import Annotated
 
@@ -11,8 +12,9 @@ from ...errors import InputError, counted
 from ...io.data_files import FLO
 from ...output.vectors import PROGRAMS
 from ...run.vectors import VectorsRequest
+from .. import run_log
 from ..console import Console
-from ..options import Adapter, InputOptions, Inputs, Quiet, Verbose
+from ..options import Adapter, InputOptions, Inputs, LogJson, Quiet, Verbose
 
 
 def vectors(
@@ -31,6 +33,7 @@ def vectors(
     overwrite: bool = False,
     resume: bool = False,
     adapter: Adapter = None,
+    log_json: LogJson = None,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> int:
@@ -57,6 +60,7 @@ def vectors(
     quiet
         Print errors only.
     """
+    run_log.begin(log_json, "vectors", output)
     if program is None:
         if not output.lower().endswith(FLO):
             raise InputError(f"`program` is missing: the form of {output}, {', '.join(PROGRAMS)}")
@@ -75,8 +79,9 @@ def vectors(
     console = Console(quiet, verbose)
     console.detail(f"settings: {files.settings}")
     started = time.perf_counter()
+    run_log.start([pattern], files.pattern, json.loads(files.settings), len(clip.numbers))
     with console.progress(len(clip.numbers), "writing vectors") as tick:
-        report = run(tick)
+        report = run(run_log.logged(tick, files.pattern))
     for number, count in sorted(files.clipped.items()):
         console.say(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
     if len(clip.chosen) > 1 and not files.takes_views:

@@ -23,7 +23,7 @@ from ...sequence.findings import ranges
 from ...threads import within
 from ..engine import ON_REQUEST
 from ..job import Job
-from ..report import BatchReport, Progress, describe_input
+from ..report import BatchReport, Failure, Progress, describe_input
 from . import local, merge
 from .workers import (
     LATE,
@@ -320,7 +320,8 @@ class Driver:
     def _heard(self, kind: str, event: Any) -> None:
         if kind == "told":
             for number, state in event["told"]:
-                self._tick(number, state)
+                if state != "failed":  # its reason comes with the report of the part
+                    self._tick(number, state)
             return
         address, future = event
         worker = self._workers.get(address)
@@ -364,7 +365,8 @@ class Driver:
         merge.share(report, part.numbers)
         merge.add(self.report, report)
         for number in (*done, *report.failed):
-            self._tick(number, "failed" if number in report.failed else "done")
+            failed = report.failed.get(number)
+            self._tick(number, "done" if failed is None else Failure(failed))
 
     def _fault(self, worker: Worker, part: Chunk, error: BaseException | None) -> None:
         """The part could not even be begun."""
@@ -391,7 +393,7 @@ class Driver:
     def _fail(self, part: Chunk, why: str) -> None:
         for number in part.numbers:
             self.report.failed[number] = why
-            self._tick(number, "failed")
+            self._tick(number, Failure(why))
 
     def _tick(self, number: int, state: str) -> None:
         at = int(np.searchsorted(self._order, number))

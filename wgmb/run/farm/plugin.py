@@ -101,7 +101,7 @@ class BlurPlugin(WorkerPlugin):
 
         def tell(number: int, state: str) -> None:
             nonlocal last
-            told.append((number, state))
+            told.append((number, str(state)))  # which a message can hold
             if time.monotonic() > last + _PAUSE:
                 send()
                 last = time.monotonic()
