@@ -60,6 +60,11 @@ def beauty(folder, numbers=NUMBERS, **more):
     return folder / "beauty.####.exr"
 
 
+def in_full(*cases):
+    """Cases that are tried with all others only."""
+    return [pytest.param(case, marks=pytest.mark.full) for case in cases]
+
+
 def of_layers(folder, layers, kind="f4"):
     """Frames with the picture and further channels, of which `layers(n)` has (h, w, 2)."""
     for n in NUMBERS:
@@ -179,7 +184,7 @@ def test_where_nothing_was_drawn_vectors_around_half_do_not_move(tmp_path):
     is_right(Clip(beauty(tmp_path), passes=Passes(also=(str(tmp_path / "mv.####.png"),))), 0.05)
 
 
-@pytest.mark.parametrize("form", ["png", "tif", "exr", "flo"])
+@pytest.mark.parametrize("form", ["png", "flo", *in_full("tif", "exr")])
 def test_what_wgmb_writes_for_other_programs_comes_back(tmp_path, capsys, form):
     pattern = make.write_sequence(tmp_path, NUMBERS, "nuke")
     out = tmp_path / f"mv.####.{form}"
@@ -414,12 +419,35 @@ def test_vectors_to_the_previous_frame_may_lead_from_it(tmp_path, names, sign):
     np.testing.assert_array_equal(motion_of(clip), np.dstack(make.motion(5)))
 
 
-@pytest.mark.parametrize("name", ["Normal Vector", "position", "world_velocity", "P"])
+@pytest.mark.parametrize("name", ["Normal Vector", "P", *in_full("position", "world_velocity")])
 def test_other_vectors_are_not_motion(tmp_path, name):
     names = f"{name}.x,{name}.y"
     clip = Clip(of_layers(tmp_path, lambda n: {names: to_next(n)}))
     assert clip.frame(clip.source(5)).motion is None
     assert "vector_layer" not in clip.finding
+
+
+def test_a_layer_around_a_half_is_named_with_its_option(tmp_path, capsys):
+    """As Corona's CGeometry_VelocityField, or a name in another language."""
+    names = "Bewegung.R,Bewegung.G"
+    pattern = of_layers(tmp_path, lambda n: {names: to_next(n) * UP / 64 + 0.5})
+    _, out, _ = make.inside(capsys, "info", pattern)
+    assert "Bewegung is 0.5 in most places; --vector-layer Bewegung takes Bewegung" in out
+    is_right(Clip(pattern, passes=Passes(vectors=Vectors(layer="Bewegung"))), 0.1)
+
+
+@pytest.mark.fast
+def test_directions_and_constants_are_no_candidates():
+    rng = np.random.default_rng(0)
+    still = np.full((64, 64), 0.5, np.float32)
+    some = still.copy()
+    some[20:40, 20:40] = rng.random((20, 20))
+    assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 0 * still}) == ["a"]
+    assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 2 * still}) == []
+    assert vectors.candidates({"a.R": still, "a.G": still}) == []
+    small = np.zeros((64, 64), np.float32)
+    small[5:11, 5:11] = -3
+    assert vectors.candidates({"a.R": small, "a.G": small}) == ["a"]
 
 
 def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys):
@@ -488,7 +516,7 @@ def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind)
     assert ("larger depth is nearer" in out) == (kind != "planar")
 
 
-@pytest.mark.parametrize("empty", [np.inf, 1e10, np.nan, 0.0])
+@pytest.mark.parametrize("empty", [np.inf, 0.0, *in_full(1e10, np.nan)])
 def test_empty_depth_does_not_turn_its_order(tmp_path, empty):
     clip = Clip(of_depth(tmp_path, KINDS["planar"], empty))
     assert tuple(order_of(clip)) == (3, 9)

@@ -31,6 +31,7 @@ from .names import (
 _BACKWARD = ("backward", "toprev", "motionback", "backvector", "backwardvector", "backwardflow")
 _PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?(?P<axis>[xyuvXYUV])")
 _UNIT = 0.02  # from 1: the length of a unit vector, in half floats
+_STEP = 1 / 255  # of 8 bits, by which 0.5 may be off
 _MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
 _NEARLY = 0.9  # of the numbers
 _WIDE = 0.25  # from the middle: where the median of numbers lies that are stored around it
@@ -133,8 +134,8 @@ def named(
 def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> list[str]:
     """Layers that may hold vectors under a name that does not say so.
 
-    They have two channels, or three, with negative numbers, and are neither unit vectors nor called
-    as something else.
+    They have two channels, or three, with negative numbers or 0.5 where nothing moves, and are
+    neither unit vectors nor called as something else.
     """
     found = []
     for layer, members in layers(channels, near).items():
@@ -142,11 +143,25 @@ def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> l
             continue
         planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
         with np.errstate(all="ignore"):
-            lengths = np.sqrt((planes**2).sum(axis=0))
-            is_unit = np.abs(lengths - 1) < _UNIT
-            if (planes < 0).any() and (is_unit | (lengths == 0)).mean() < _MOSTLY:
+            centred = planes if (planes < 0).any() else _around_half(planes)
+            lengths = np.sqrt((centred**2).sum(axis=0))
+            is_unit = np.abs(lengths[lengths > 0] - 1) < _UNIT
+            if is_unit.size and is_unit.mean() < _MOSTLY:
                 found.append(layer)
     return found
+
+
+def _around_half(planes: np.ndarray) -> np.ndarray:
+    """Two numbers from 0 to 1 as -1 to 1, if most of them say that nothing moves; else 0.
+
+    A third one that is mostly 1 tells directions: a surface that looks at the camera.
+    """
+    flat = planes[:2]
+    is_still = np.abs(flat - 0.5) < _STEP
+    is_stored_so = (planes >= 0).all() and (planes <= 1).all() and is_still.mean() > 0.5
+    is_direction = len(planes) == 3 and np.median(planes[2]) > 1 - _STEP
+    is_motion = is_stored_so and not is_still.all() and not is_direction
+    return 2 * flat - 1 if is_motion else np.zeros_like(flat)
 
 
 def named_as_flow(planes: Mapping[str, np.ndarray], title: str) -> dict[str, np.ndarray]:
