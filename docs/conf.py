@@ -12,7 +12,7 @@ author = "The wgmb authors"
 copyright = "2026, the wgmb authors"
 version = release = __version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "api", "commands", "mathml", "self_contained"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "api", "mathml", "self_contained"]
 exclude_patterns = ["extensions"]
 language = "en"
 

@@ -1,6 +1,9 @@
 """The command line's reference, and tables of scenes and conventions, asked of the program.
 
-A page gets them where it has a comment such as `<!-- commands -->`.
+    python tools/reference_pages.py     write them into the pages, after a change of an option
+
+A page has them between comments such as `<!-- commands -->` and `<!-- end of commands -->`.
+tests/project/test_docs.py holds them to the program.
 """
 
 import inspect
@@ -9,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from cyclopts import App
-from sphinx.application import Sphinx
 
 from wgmb.cli.app import COMMANDS, make_app
 from wgmb.cli.help import GROUPS, MAIN, about, place
 from wgmb.scene import builtin
 from wgmb.sequence.layers.vectors import CONVENTIONS
 
+DOCS = Path(__file__).parents[1] / "docs"
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
 
 
@@ -52,16 +55,16 @@ def _command(name: str, command: App) -> str:
     words = [_usage(argument) for argument in shown if argument.required]
     paragraphs, examples = about(command)
     text = "\n\n".join(map(_plain, paragraphs))
-    lines = [f"(wgmb-{name})=", f"## wgmb {name}", "", text, ""]
-    lines += ["```sh", f"wgmb {' '.join((name, *words))} [OPTIONS]", *examples, "```", ""]
+    lines = [f"## wgmb {name}", "", text, ""]
+    lines += ["```text", f"wgmb {' '.join((name, *words))} [OPTIONS]", "```", ""]
+    lines += ["```sh", *examples, "```", ""] if examples else []
     groups: dict[str, list[Any]] = {group.name: [] for group in GROUPS}
     for argument in shown:
         groups.setdefault(argument.parameter.group[0].name, []).append(argument)
     groups[MAIN.name].sort(key=lambda one: (not _is_position(one), place(one.names)))
     for group, found in groups.items():
         lines += [f"### {group}", ""] if found else []
-        for argument in found:
-            lines += [*_option(name, argument), ""]
+        lines += [*map(_option, found), ""] if found else []
     return "\n".join(lines)
 
 
@@ -97,8 +100,8 @@ def _kind(argument) -> str:
     return "|".join((*choices, *(kind for kind in kinds if kind)))
 
 
-def _option(command: str, argument) -> list[str]:
-    """An entry of a definition list that other pages can refer to."""
+def _option(argument) -> str:
+    """An entry of a list."""
     names, kind = _names(argument), _kind(argument)
     default, notes = argument.field_info.default, []
     if argument.required:
@@ -109,8 +112,7 @@ def _option(command: str, argument) -> list[str]:
         notes.append(f"Default: `{shown}`.")
     written = ", ".join(f"`{name} {kind}`".replace(" `", "`") for name in names)
     about = _plain(" ".join((argument.parameter.help or "").split()))
-    anchor = f"wgmb-{command}-{names[0].strip('-').lower()}"
-    return [f"({anchor})=", written, f": {' '.join((about, *notes))}"]
+    return f"- {written}: {' '.join((about, *notes))}"
 
 
 def _plain(text: str) -> str:
@@ -119,16 +121,28 @@ def _plain(text: str) -> str:
     return re.sub(r"(?<![\w`-])(--[a-z][a-z-]+|[A-Za-z_]+\.[#%]\S*\w|[A-Z]+=[A-Z]+)", r"`\1`", text)
 
 
-_TABLES = {"commands": reference, "scenes": scene_table, "conventions": convention_table}
+PAGES = {
+    "reference/cli.md": ("commands", reference),
+    "python/scenes.md": ("scenes", scene_table),
+    "artists/vectors-look-wrong.md": ("conventions", convention_table),
+}
+"""The mark of each page, and the function that makes what follows it."""
 
 
-def _fill(app: Sphinx, page: str, source: list[str]) -> None:
-    for mark, make in _TABLES.items():
-        if f"<!-- {mark} -->" in source[0]:
-            source[0] = source[0].replace(f"<!-- {mark} -->", make())
+def filled(page: str, text: str) -> str:
+    """The text of a page with what it has of the program as it is now."""
+    mark, make = PAGES[page]
+    begin, end = f"<!-- {mark} -->\n", f"<!-- end of {mark} -->"
+    before, _, rest = text.partition(begin)
+    return f"{before}{begin}\n{make().strip()}\n\n{end}{rest.partition(end)[2]}"
 
 
-def setup(app: Sphinx) -> dict:
-    """Called by Sphinx."""
-    app.connect("source-read", _fill)
-    return {"parallel_read_safe": True, "parallel_write_safe": True}
+def main() -> None:
+    """Write the pages anew."""
+    for page in PAGES:
+        path = DOCS / page
+        path.write_text(filled(page, path.read_text("utf-8")), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
