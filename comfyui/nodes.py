@@ -24,18 +24,23 @@ _REMEDY = (
 )
 
 
-@cache
 def device():
-    """The GPU, opened once; an error that names the remedy where there is none."""
+    """The GPU, a new one where it was lost; an error that names the remedy where there is none."""
     try:
         found = wgmb.gpu.open_device()
     except wgmb.DeviceError as error:
-        device.cache_clear()
         raise RuntimeError(f"{error}. {_REMEDY}.") from None
-    logging.info("wgmb: %s", found.adapter.summary)
-    if found.adapter_info["adapter_type"] == wgmb.gpu.SOFTWARE:
-        logging.warning("wgmb: Vulkan sees no GPU, so this is slow. %s.", _REMEDY)
+    is_software = found.adapter_info["adapter_type"] == wgmb.gpu.SOFTWARE
+    _tell(found.adapter.summary, is_software)
     return found
+
+
+@cache
+def _tell(name, is_software):
+    """Log which GPU it is, once."""
+    logging.info("wgmb: %s", name)
+    if is_software:
+        logging.warning("wgmb: Vulkan sees no GPU, so this is slow. %s.", _REMEDY)
 
 
 def shared_inputs():

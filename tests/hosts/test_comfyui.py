@@ -20,6 +20,8 @@ import make_clips
 import make_frames
 import wgmb
 from fake_comfy import tensor
+from wgmb.gpu import device as devices
+from wgmb.gpu import kernels
 from wgmb.video.read.reader import VideoReader
 
 PACK = Path(__file__).parents[2] / "comfyui"
@@ -119,6 +121,32 @@ def test_frames_of_a_video_become_frames_with_its_sound(pack):
     found = made.get_components()
     assert (found.frame_rate, found.audio, found.metadata) == (parts.frame_rate, sound, {"a": "b"})
     assert found.images.shape == parts.images.shape
+
+
+@pytest.fixture
+def own_device():
+    """Devices that are opened in the test alone."""
+    devices._device.cache_clear()
+    yield
+    devices._device.cache_clear()
+    kernels.forget_kernels()
+
+
+def test_a_lost_gpu_ends_one_run_and_the_next_one_has_a_new_one(
+    pack, own_device, monkeypatch, tmp_path
+):
+    def lose(bar, count):
+        pack.device().destroy()
+
+    video = fake_comfy.VideoFromFile(str(make_clips.write(tmp_path / "in.mp4")))
+    with monkeypatch.context() as patched:
+        patched.setattr(pack.ProgressBar, "update", lose)
+        with pytest.raises(wgmb.DeviceError, match="lost"):
+            pack.MotionBlur.execute(images(30), **GIVEN, fps_in=24.0)
+    assert pack.MotionBlur.execute(images(), **GIVEN, fps_in=24.0)[0].shape == images().shape
+    pack.device().destroy()
+    (made,) = pack.MotionBlurVideo.execute(video, **GIVEN)
+    assert len(VideoReader(made.get_stream_source())) == 12
 
 
 def test_a_stop_is_heard_while_a_picture_is_being_made(pack, server, monkeypatch):

@@ -1,5 +1,10 @@
 """A device that is lost in any kind of run: a DeviceError, exit 3, and nothing half written."""
 
+import contextlib
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
 import numpy as np
 import pytest
 from wgpu.backends.wgpu_native import GPUQueue
@@ -35,6 +40,8 @@ RUNS = {
         "--size",
         "64x48",
     ),
+    "a pipe into a video": ("blur", "pipe.y4m", "-o", "o.mp4", "--flow", "none", "--fps", "12"),
+    "a pipe, searched": ("blur", "pipe.y4m", "-o", "o.mp4", "--flow", "search"),
     "timing": ("bench", "--size", "64x48", "--methods", "tap", "--rounds", "1"),
 }
 
@@ -69,23 +76,60 @@ def inputs(tmp_path_factory):
     for number in range(1, 8):
         make.write_exr(folder / f"plain.{number:04}.exr", make.frame(number, None))
     clips.write(folder / "in.mp4")
+    clips.write(folder / "pipe.y4m", codec="rawvideo", kind="yuv4mpegpipe")
     return folder
+
+
+@pytest.fixture
+def pool():
+    with ThreadPoolExecutor() as pool:
+        yield pool
+
+
+def piped(path: Path, data: bytes, pool: ThreadPoolExecutor) -> Path:
+    """A named pipe at `path` which gives `data`."""
+
+    def write() -> None:
+        with contextlib.suppress(BrokenPipeError):  # the run ended before it had read all
+            path.write_bytes(data)
+
+    os.mkfifo(path)
+    pool.submit(write)
+    return path
 
 
 @pytest.mark.parametrize("kind", RUNS)
 @pytest.mark.parametrize("count", [1, 3, 6])
 def test_a_lost_device_ends_a_run_in_one_line(
-    inputs, tmp_path, capsys, monkeypatch, loses_after, kind, count
+    inputs, tmp_path, capsys, monkeypatch, loses_after, pool, kind, count
 ):
     monkeypatch.chdir(tmp_path)
     words = [
         str(inputs / w) if (inputs / w.replace("####", "0001")).exists() else w for w in RUNS[kind]
     ]
+    if "pipe.y4m" in RUNS[kind]:
+        words[1] = str(piped(tmp_path / "pipe.y4m", Path(words[1]).read_bytes(), pool))
     loses_after(count)
     code, _, err = make.inside(capsys, *words)
     assert code == NO_DEVICE, err
     assert "lost" in err and "Traceback" not in err
     assert [path for path in tmp_path.rglob("*") if ".part" in path.name] == []
+
+
+@pytest.mark.parametrize("count", [1, 3, 6])
+def test_a_lost_device_leaves_whole_pictures_in_a_pipe(
+    inputs, tmp_path, capsys, loses_after, pool, count
+):
+    read, out = (inputs / "pipe.y4m").read_bytes(), tmp_path / "out.y4m"
+    os.mkfifo(out)
+    written = pool.submit(out.read_bytes)
+    source = piped(tmp_path / "in.y4m", read, pool)
+    loses_after(count)
+    code, _, err = make.inside(capsys, "blur", source, "-o", out, "--flow", "none")
+    assert code == NO_DEVICE and "lost" in err and "Traceback" not in err, err
+    pictures = written.result().split(b"FRAME\n")[1:]
+    whole = len(read.split(b"FRAME\n")[1])
+    assert len(pictures) < 12 and {len(picture) for picture in pictures} <= {whole}
 
 
 @pytest.mark.parametrize("count", [1, 3])

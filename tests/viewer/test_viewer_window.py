@@ -1,12 +1,16 @@
 """Sizes, pixel ratios and errors of the viewer, and its pace while something moves."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+import make_clips as clips
+import make_frames as make
 from viewer_hand import BESIDE, PLAIN, SIZE, Hand, put
-from wgmb import DeviceError, gpu
+from wgmb import gpu
+from wgmb.cli.exit_codes import NO_DEVICE
 from wgmb.gpu.timing import TimestampClock
 from wgmb.viewer import offscreen
 from wgmb.viewer.draw.adaptive import Pace
@@ -90,14 +94,28 @@ def test_an_error_while_drawing_is_not_swallowed(monkeypatch):
     assert hand.viewer.canvas.get_closed()
 
 
-def test_a_lost_gpu_is_told():
-    wanted = ["float32-filterable"]
-    device = gpu.choose_adapter().request_device_sync(required_features=wanted)
-    viewer = offscreen(PLAIN, (320, 180), device=device)
-    frame(viewer)
-    device.destroy()
-    with pytest.raises(DeviceError, match="lost"):
-        frame(viewer)
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """Words that name what the viewer shows."""
+    folder = tmp_path_factory.mktemp("shown")
+    video, pattern = clips.write(folder / "in.mp4"), make.write_sequence(folder, range(1, 4))
+    return {"a scene": [], "frames": [pattern], "a video": [video, "--flow", "dis"]}
+
+
+@pytest.mark.parametrize("kind", ["a scene", "frames", "a video"])
+def test_a_lost_gpu_ends_the_viewer_in_one_line(shown, kind, capsys, monkeypatch):
+    def window(state, **settings):
+        device = gpu.second_device(gpu.open_device())
+        viewer = offscreen(replace(state, panel=False), (320, 180), device=device)
+        for number in range(60):
+            if number == 3:
+                device.destroy()
+            frame(viewer)
+
+    monkeypatch.setattr("wgmb.viewer.view", window)
+    code, _, err = make.inside(capsys, "view", *shown[kind])
+    assert code == NO_DEVICE, err
+    assert "the GPU device was lost" in err and len(err.splitlines()) == 1
 
 
 def test_times_of_the_gpu_are_told_by_pass(monkeypatch):
