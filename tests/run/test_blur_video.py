@@ -1,5 +1,7 @@
 """`wgmb blur` of videos, and of pictures without vectors: times, shares, motion, files."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from fractions import Fraction
 
@@ -330,6 +332,30 @@ def test_a_cut_between_pictures_is_not_crossed(tmp_path, capsys):
     assert "frames in" in text
     with Image.open(tmp_path / "a.3.png") as a, Image.open(tmp_path / "b.3.png") as b:
         assert np.abs(np.asarray(a).astype(int) - np.asarray(b)).mean() < 12
+
+
+@pytest.mark.parametrize("method", ["tap", "tiles", "fusion", "reproject", "gather"])
+def test_a_picture_alone_in_its_shot_is_copied_and_named(tmp_path, capsys, method):
+    path, out = write(tmp_path / "a.mkv", moving(6), fps=24, codec="ffv1"), tmp_path / "b.mkv"
+    words = ("--codec", "ffv1", "--flow", "dis", "--method", method, "--cuts", "only:2,3")
+    text = run(capsys, "blur", path, "-o", out, *words)
+    assert "picture 2: alone in a shot" in text
+    before, after = lumas(path), lumas(out)
+    differ = [np.abs(a.astype(int) - b).max() for a, b in zip(before, after, strict=True)]
+    assert differ[2] <= 1 and differ[1] > 8
+
+
+def test_pictures_alone_are_named_in_a_pipe_and_of_many_videos(tmp_path, capsys):
+    for name in ("a.mkv", "c.mkv"):
+        write(tmp_path / name, moving(4), fps=24, codec="ffv1")
+    os.mkfifo(tmp_path / "b.y4m")
+    with ThreadPoolExecutor() as pool:
+        pool.submit((tmp_path / "b.y4m").read_bytes)
+        cuts = ("--flow", "dis", "--cuts", "only:1,2")
+        text = run(capsys, "blur", tmp_path / "a.mkv", "-o", tmp_path / "b.y4m", *cuts)
+    assert "pictures 0-1: alone in a shot" in text
+    words = (tmp_path / "a.mkv", tmp_path / "c.mkv", "-o", f"{tmp_path / 'out'}/")
+    assert run(capsys, "blur", *words, *cuts).count("pictures 0-1: alone in a shot") == 2
 
 
 def packets(path, kind):

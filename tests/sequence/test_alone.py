@@ -25,7 +25,7 @@ def test_a_frame_alone_in_its_shot_is_copied_and_named(tmp_path, capsys, method)
     words = ("blur", pattern, "-o", out, "--method", method, "--cuts", "only:3,4")
     code, _, err = make.inside(capsys, *words)
     assert code == 0
-    assert "frame 3: is alone in its shot" in err and "frame 2: is alone" not in err
+    assert "frame 3: alone in a shot" in err and "frame 2: alone" not in err
     before, after = (stills.read(tmp_path / f"{name}.0003.png") for name in "po")
     assert np.abs(after - before).max() < 1e-6
     moved = [stills.read(tmp_path / f"{name}.0002.png") for name in "po"]

@@ -76,4 +76,4 @@ def test_pictures_of_another_data_window_are_of_another_shot(tmp_path, order):
     has = {n: "motion" in clip.frame(clip.source(n)).has for n in order}
     assert watcher.seen == {1: [1, 2], 2: [1, 2], 3: [3, 4], 4: [3, 4], 5: [5]}
     assert all(has.values())
-    assert [on for text, on in clip.notes.items() if "alone in its shot" in text] == [[5]]
+    assert [on for text, on in clip.notes.items() if "alone in a shot" in text] == [[5]]

@@ -14,6 +14,7 @@ import pytest
 import make_clips as clips
 from wgmb import InputError
 from wgmb.color.coding import CodedPicture, Coding
+from wgmb.io import leftovers
 from wgmb.video.clock import tick
 from wgmb.video.hdr10 import LightLevel
 from wgmb.video.read.reader import VideoReader
@@ -151,6 +152,46 @@ def test_a_process_that_is_killed_leaves_nothing_in_the_way(tmp_path):
     parts.join()
     assert list(VideoReader(path).times) == times
     assert [p.name for p in tmp_path.iterdir()] == ["v.mp4"]
+
+
+def in_folder(parts) -> list[str]:
+    return sorted(path.name for path in parts.folder.glob("0*.*"))
+
+
+@pytest.mark.parametrize("is_recorded", [False, True])
+def test_a_run_that_is_ended_keeps_segments_with_records_alone(tmp_path, monkeypatch, is_recorded):
+    """A signal may end the run just before a segment has its record, and just after."""
+    monkeypatch.setattr(leftovers, "_removals", {})
+    monkeypatch.setattr(leftovers, "_is_over", [])
+    parts, coding, times = segmented(tmp_path / "o.mkv")
+    finished, seen = parts.finished, []
+
+    def ended(index):
+        if is_recorded:
+            finished(index)
+        seen.extend(in_folder(parts))
+        leftovers.remove_all(5)  # as a signal does from a thread of its own
+        seen.append(in_folder(parts))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(parts, "finished", ended)
+    with pytest.raises(KeyboardInterrupt):
+        fill(parts, coding, times)
+    both = ["00000.json", "00000.mkv"]
+    assert seen == ([*both, both] if is_recorded else ["00000.mkv", []])
+
+
+def test_a_segment_whose_record_cannot_be_written_is_removed(tmp_path, monkeypatch):
+    parts, coding, times = segmented(tmp_path / "o.mkv")
+
+    def full(index):
+        assert in_folder(parts) == ["00000.mkv"]
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(parts, "finished", full)
+    with pytest.raises(OSError, match="No space"):
+        fill(parts, coding, times)
+    assert in_folder(parts) == []
 
 
 def test_segments_of_anything_else_are_made_again(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import counted
 from ..io.frame_numbers import frame_list, numbered
 from ..run.report import BatchReport, VideoReport
+from ..sequence.frame_builder import ALONE
 from ..sequence.frame_file import odd_sizes
 from . import terminal
 from .exit_codes import DONE, SOME_FAILED
@@ -107,10 +108,16 @@ def pictures_told(report: VideoReport, fills: bool) -> list[str]:
     return [
         cuts_told(report.cuts, "picture") if report.cuts else "",
         f"flash at picture {flashes}" if flashes else "",
+        alone_told(report.alone),
         repeats_told(report.repeated) if fills else "",
         report.held_out,
         report.scaling,
     ]
+
+
+def alone_told(numbers: Sequence[int]) -> str:
+    """The line about pictures that are copied as nothing is beside them; "" where none is."""
+    return f"{numbered(sorted(numbers), 'picture')}: {ALONE}" if numbers else ""
 
 
 def repeats_told(count: int) -> str:

@@ -22,6 +22,7 @@ from ..pipeline.blur import Blur
 from ..sequence import panorama
 from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement
+from ..sequence.frame_builder import ALONE
 from ..sequence.frame_file import FrameFile
 from ..shots.motion import MotionSource
 from ..shots.reader import REACH, Picture
@@ -219,6 +220,9 @@ class PictureStages(Stages):
             else:
                 encoder = exposures.device.create_command_encoder(label="result")
                 picture = self._images.download(encoder, exposure.light())
+        if source.number in textures.alone:
+            on = self.clip.notes.setdefault(ALONE, [])
+            on += [source.number] if source.number not in on else []
         if source.rgba.shape[2] == 3:
             picture = picture[..., :3]
         elif picture.shape[2] == 3:

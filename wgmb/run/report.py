@@ -122,6 +122,8 @@ class VideoReport:
     cuts: list[int] = field(default_factory=list)
     """Numbers of the input's pictures that begin a shot."""
     flashes: list[int] = field(default_factory=list)
+    alone: list[int] = field(default_factory=list)
+    """Numbers of the pictures that were copied, as each is alone in its shot."""
     repeated: int = 0
     """Number of repeated pictures that were left out."""
     scaling: str = ""

@@ -228,6 +228,7 @@ class VideoRun:
             method=" and ".join(exposures.methods) if self.motion is not None else "",
             cuts=sorted(shots.cuts) if shots else [],
             flashes=shots.flashes if shots else [],
+            alone=exposures.alone,
             repeated=len(shots.doubles) if shots else 0,
             is_new=shots is not None,
             held_out=exposures.holdout.message,

@@ -20,7 +20,8 @@ from .layers.masks import Masks
 from .layers.vector_convention import ConventionFinder
 from .layers.vector_test import ConventionFinding
 
-_ALONE = "is alone in its shot, so no motion can be found, and it is copied"
+ALONE = "alone in a shot, so no motion can be found: copied"
+"""The line about such a frame, or picture of a video, after its number."""
 _OBJECT_STEMS = ("indexob", "objectindex", "object_id")
 
 OPTIONAL = frozenset({"color", "diffuse_light", *layers.TRIPLES})
@@ -110,7 +111,7 @@ class FrameBuilder:
 
     def _alone(self, source: FrameFile) -> Found:
         """No motion, of a frame that has no neighbour in its shot to find motion from; noted."""
-        on = self._stored.notes.setdefault(_ALONE, [])
+        on = self._stored.notes.setdefault(ALONE, [])
         if source.number not in on:
             on.append(source.number)
         return standing(source)

@@ -71,6 +71,14 @@ class Exposures:
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self._used: set[str] = set()
         self.shots: ShotReader[Thumbnail] | None = None
+        self._frames: VideoFrames | None = None
+
+    @property
+    def alone(self) -> list[int]:
+        """Numbers of the pictures that were copied, as each is alone in its shot; no flashes."""
+        if self._frames is None or self.shots is None:
+            return []
+        return sorted(self._frames.alone.difference(self.shots.flashes))
 
     @property
     def methods(self) -> list[str]:
@@ -104,7 +112,7 @@ class Exposures:
             flash=self._flash,
             tolerance=self._tolerance,
         )
-        frames = self.frames(shots)
+        self._frames = frames = self.frames(shots)
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
             yield frame, Exposure(self, shots, frames, cells)

@@ -31,7 +31,8 @@ class VideoFrames:
 
     `motion`: where motion comes from, or None. `holdout`: what stays sharp, where there is motion.
     `planes`: make their light; motion is searched in light that is not expanded. `changing`: adds
-    what light changes, for all that blur pictures of `shots`.
+    what light changes, for all that blur pictures of `shots`. Numbers of pictures that are copied,
+    as none of their shot is beside them to find motion from, are `alone`.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class VideoFrames:
         self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
         self._holdout = holdout or Holdout(displays=False)
         self._held = self._holdout.of(shots)
+        self.alone: set[int] = set()
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, tuple[int, FrameViews]] = {}  # by the place of their textures
@@ -112,6 +114,8 @@ class VideoFrames:
         """The views of one picture, with its motion within its own interval."""
         found = None if self._source is None else self._source.textures(index)
         if found is None:
+            if self._source is not None:
+                self.alone.add(self._shots[index].number)
             return FrameViews(color=light, key=object())
         (motion, depth), factors = found, self._factors(index)
         if factors != (1.0, 1.0):

@@ -23,7 +23,7 @@ from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
 from .. import run_log
-from ..console import Console, pictures_told, repeats_told
+from ..console import Console, alone_told, pictures_told, repeats_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import is_batch, outputs_of, videos_of
@@ -167,7 +167,8 @@ def _log_end(report: VideoReport) -> None:
 def _remarks(report: VideoReport, run: VideoRun) -> list[str]:
     """Lines on what was seen in a video; some are empty."""
     fills = report.is_new and run.request.video.duplicates == "fill"
-    return [repeats_told(report.repeated) if fills else "", report.held_out, report.scaling]
+    repeats, alone = repeats_told(report.repeated) if fills else "", alone_told(report.alone)
+    return [alone, repeats, report.held_out, report.scaling]
 
 
 def _reason(error: BaseException, path: Path) -> str:
