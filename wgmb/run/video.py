@@ -142,7 +142,9 @@ class VideoRun:
         qualities = {"best": "`flow_quality=fast`", "fast": "`flow_quality=draft`"}
         if flow.flow == "search" and flow.flow_quality in qualities:
             found = f"{qualities[flow.flow_quality]} takes less"
-        elif (flow.flow == "search" and is_installed("cv2")) or self.at_edges is not None:
+        elif (flow.flow == "search" and is_installed("cv2")) or (
+            flow.flow == "dis" and self.at_edges is not None
+        ):
             found = "`flow=dis` takes less, but loses what is fast"
         elif flow.flow == "dis" and (flow.flow_quality, method) != ("fast", "tap"):
             by = "`flow_quality=fast`" if flow.flow_quality == "best" else "`method=tap`"

@@ -33,9 +33,9 @@ class FlowSettings:
 
     @property
     def method(self) -> str:
-        """The blur method that suits this motion: dense inverse search is to be quick.
+        """The blur method that suits this motion: OpenCV's dense inverse search is to be quick.
 
-        Of settings that are `chosen`, as "auto" may become either.
+        Of settings that are `chosen`, as "auto" may become that.
         """
         return "gather" if self.flow in ("auto", "search") else "tap"
 
@@ -44,6 +44,10 @@ class FlowSettings:
         settings, how = self.chosen(device)
         if settings.flow == "none":
             return None, how
+        if settings.flow == "auto":
+            from ..flow.dense import DenseInverseSearch
+
+            return DenseInverseSearch(device=device), how
         if self.is_by_place(device):
             return by_place(), how
         if settings.flow == "dis":
@@ -56,10 +60,13 @@ class FlowSettings:
 
     def is_by_place(self, device: wgpu.GPUDevice) -> bool:
         """True if "auto" becomes dense inverse search that is made better by place."""
-        return self.flow == "auto" and self.chosen(device)[0].flow == "dis"
+        return self.flow == "auto" and self.chosen(device)[0].flow != "search"
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
-        """A copy in which `flow` is chosen as it suits the device, and the choice in words."""
+        """A copy in which `flow` is chosen as it suits the device, and the choice in words.
+
+        It stays "auto" for dense inverse search on a GPU, with a search of blocks.
+        """
         if self.flow == "none":
             return self, "none: pictures are averaged"
         is_draft = self.flow_quality == "draft"
@@ -67,6 +74,8 @@ class FlowSettings:
             raise InputError("`flow_quality` draft is for `flow` search; dis is best or fast")
         flow, quality, why = self.flow, self.flow_quality, ""
         software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        if flow == "auto" and not software and not is_draft:
+            return self, "dense inverse search on the GPU, and in blocks where something is fast"
         if flow == "auto" and software and not is_draft:
             flow, quality = ("dis", "fast") if is_installed("cv2") else ("search", "draft")
             why = f" ({quality}, because there is no GPU)"

@@ -8,6 +8,7 @@ from typing import Any
 import wgpu
 
 from ..flow import Flow, Shot
+from ..flow.dense import DenseInverseSearch, DenseShot
 from ..flow.dis import DisShot
 from ..flow.dis.by_place import PlaceShot
 from ..gpu.textures import TexturePool
@@ -23,8 +24,8 @@ Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]
 class VideoMotion(ShotMotion):
     """The motion of pictures in time, by their indices, nowhere ragged.
 
-    Flow takes them as textures of `device`, in light that is not expanded, others as grey. What is
-    smooth, as dense inverse search is, is left as it is.
+    Flow and DenseInverseSearch take them as textures of `device`, in light that is not expanded,
+    others as grey. What is smooth, as dense inverse search is, is left as it is.
     """
 
     def __init__(
@@ -35,7 +36,8 @@ class VideoMotion(ShotMotion):
         depth: bool = True,
     ):
         searched = _Searched(shots, device)
-        picture = searched.texture if isinstance(source, Flow) else searched.grey
+        is_on_gpu = isinstance(source, Flow | DenseInverseSearch)
+        picture = searched.texture if is_on_gpu else searched.grey
         super().__init__(source, picture, shots.moves_on, depth)
         self._device, self._images = device, TexturePool(device)
         self._ragged = RaggedMotion(device)
@@ -49,6 +51,8 @@ class VideoMotion(ShotMotion):
         if isinstance(shot, DisShot):
             motion = shot.motion(index)
             return None if motion is None else (self._up("motion", index, motion), None)
+        if isinstance(shot, DenseShot):
+            return shot.textures(index)
         if isinstance(shot, Shot):
             found = shot.textures(index)
             return found and self._ragged(index, found.motion, found.depth)
