@@ -133,7 +133,8 @@ class VideoRun:
             return ""
         if not is_installed("cv2"):
             return f"without a GPU, OpenCV finds motion much sooner: {install_command('flow')}"
-        return "no GPU, so motion is found quickly: `flow=search` is better, but takes much longer"
+        better = "`flow=search` is better in some videos, but takes much longer"
+        return f"no GPU, so motion is found quickly: {better}"
 
     @property
     def quicker(self) -> str:

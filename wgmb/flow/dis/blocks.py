@@ -17,6 +17,7 @@ SMALL, HALF = 160, 320  # px along the longer side: where blocks are searched, a
 BLOCK, SPACING = 8, 4  # px of a block, and from one to the next
 MOST_BLOCKS = 400  # of a picture: those that fit worst
 REACH = 0.2  # of the longer side: how far a block is looked for
+SUBPIXEL = 1 / 16  # share of the texture that an error of a part of a pixel leaves as a difference
 UNFIT = 7.0  # levels of 255 of difference to the better neighbour, in the mean of 3 x 3 pixels
 CHANGED = 10.0  # levels by which such a place must differ from both neighbours, beyond noise
 NOISE = 10  # percentile of these differences that is taken for noise
@@ -82,12 +83,19 @@ class Reduced:
         better, worse = self.differences(state)
         return _cv().blur(better + OTHER * _cv().min(worse, MOST_OTHER), (3, 3))
 
+    def _texture(self) -> np.ndarray:
+        """Levels from the darkest to the brightest of 3 x 3 pixels, averaged over 3 x 3 again."""
+        around = np.ones((3, 3), np.uint8)
+        levels = _cv().dilate(self.here, around) - _cv().erode(self.here, around)
+        return _cv().blur(levels, (3, 3))
+
     def unfit(self, state: np.ndarray) -> np.ndarray:
         """Levels by which places that change fit neither neighbour, 0 for all others."""
         better, _ = self.differences(state)
         changes = [_cv().absdiff(self.here, other) for other in self.sides.values()]
         changes = _cv().blur(np.minimum.reduce(changes), (3, 3))
-        is_there = (better > UNFIT) & (changes > CHANGED + np.percentile(changes, NOISE))
+        explained = UNFIT + SUBPIXEL * self._texture()
+        is_there = (better > explained) & (changes > CHANGED + np.percentile(changes, NOISE))
         return np.where(is_there, better, 0)
 
 
