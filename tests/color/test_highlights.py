@@ -200,7 +200,8 @@ def test_lamps_of_pictures_streak_brighter_and_the_rest_stays(tmp_path, capsys):
     still = np.s_[:10]
     with Image.open(tmp_path / "a.2.png") as image:
         assert np.abs(np.asarray(image) - made[8])[still].max() <= 1
-    assert (made[8] - made[1])[24:40].max() > 30 and (made[8] - made[1]).min() >= -4
+    # Beside the lamp, light falls by the neighbours' share of the exposure at most, a quarter.
+    assert (made[8] - made[1])[24:40].max() > 30 and (made[8] - made[1]).min() >= -8
     again = run(capsys, *words, "-o", tmp_path / "8.#.png", "--highlights", 8, "--resume")
     assert "1 already done" in again
     assert "1 already done" not in run(

@@ -24,7 +24,7 @@ struct Light {
 @group(1) @binding(4) var linear: sampler;
 @group(1) @binding(5) var motion: texture_2d<f32>;      // to_prev, to_next [px]
 @group(1) @binding(6) var holdout: texture_2d<f32>;     // 1 stays as it is; of one pixel, 0, where nothing does
-@group(1) @binding(7) var<storage, read_write> sums: array<vec4f>;      // of the changes so far, linear
+@group(1) @binding(7) var<storage, read_write> sums: array<vec4f>;      // of the changes so far, linear, and of the shares
 @group(1) @binding(8) var changes: Output;              // the same, for changed.wgsl
 @group(1) @binding(9) var standing: Output;             // shares of the neighbours' light at a pixel that stands
 
@@ -57,9 +57,9 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let stands = f32(light.whole) * rests * vec2f(back.near, ahead.near);
     let moving = (1.0 - stands) * (vec2f(back.same, ahead.same) + lost);
     let change = light.shares.x * moving.x * back.gained + light.shares.y * moving.y * ahead.gained;
-    let before = select(sums[index].xyz, vec3f(0.0), light.begins == 1u);
+    let before = select(sums[index], vec4f(0.0), light.begins == 1u);
     let free = 1.0 - held(id.xy);
-    let sum = vec4f(before + free * change, 0.0);
+    let sum = before + vec4f(free * change, dot(light.shares, vec2f(light.exist)));
     sums[index] = sum;
     textureStore(changes, id.xy, sum);
     textureStore(standing, id.xy, vec4f(free * light.shares * stands, 0.0, 0.0));
