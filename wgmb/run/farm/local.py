@@ -49,6 +49,7 @@ _QUIET: dict[str, Any] = {
 _LOADED_ONCE = ["wgpu.backends.wgpu_native", "wgmb.run.farm.preloaded"]
 _CLOSING = 5.0  # seconds
 _KILLING = 0.4  # seconds until a killed process is gone
+_TRIES = 3  # of removing a folder, into which a process may write meanwhile
 _STARTING = 20.0  # seconds, after all processes have begun
 _LOOKING = 0.3  # seconds between two looks at whether one is lost
 _MOST_LOST = 3  # for each worker, until the run is given up
@@ -130,7 +131,10 @@ def kill(cluster: Any, address: str | None = None) -> None:
 def _remove(folder: str) -> None:
     """Remove the folder of a run's workers, and that of their process's connection."""
     for place in (folder, get_temp_dir()):
-        rmtree(place, ignore_errors=True)
+        for _ in range(_TRIES):
+            rmtree(place, ignore_errors=True)
+            if not os.path.lexists(place):
+                break
 
 
 @contextmanager
