@@ -87,8 +87,9 @@ def kernel(shown: scene.Scene, shutter: Shutter, time: float, fps: float, size, 
         return np.full((rows, columns), volume.CLOUD | volume.SHADOW)
 
     def remembered(device, file, texels=None, **constants):
-        def run(encoder, entry, bindings, **buffers):
-            made.append((constants, buffers, bindings.size))
+        def run(encoder, entry, bindings, over, **buffers):
+            arrays = {k: v.tobytes() for k, v in buffers.items() if isinstance(v, np.ndarray)}
+            made.append((constants, buffers | arrays, over))
 
         return SimpleNamespace(run=run)
 

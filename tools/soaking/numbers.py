@@ -115,7 +115,7 @@ def sized(sizes: list[list[int]]) -> list[list[str]]:
     for width, height in sizes:
         for method in _METHODS:
             one = parts.frame(1, (width, height))
-            made = Blur(method, samples=4)(one.between(one, one))  # pyright: ignore[reportArgumentType]
+            made = Blur(method, samples=4)(one.between(one, one))  # pyright: ignore[reportArgumentType, reportCallIssue]
             if bad := _bad(made, (width, height)):
                 wrong.append([f"{width} x {height}, {method}", bad])
     return wrong
@@ -165,7 +165,7 @@ def locked(count: int) -> list[list[str]]:
     """In a process of its own: what differs between locked frames and plain arrays."""
     wrong = []
     for method in _METHODS:
-        once, kept = Blur(method, samples=4), Blur(method, samples=4)  # pyright: ignore[reportArgumentType]
+        once, kept = Blur(method, samples=4), Blur(method, samples=4)  # pyright: ignore[reportArgumentType, reportCallIssue]
         frames = parts.neighbourly(range(count), size=(24, 16))
         for number, one in enumerate(frames):
             plain = replace(one, prev=one.prev and replace(one.prev), next=one.next)

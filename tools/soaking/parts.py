@@ -55,7 +55,7 @@ def neighbourly(numbers: range, **options) -> list[Frame]:
 
 def _image(method: str, **options) -> Callable[[], Step]:
     def begin() -> Step:
-        blur, frames = Blur(method, samples=_MANY, **options), neighbourly(range(4))  # pyright: ignore[reportArgumentType]
+        blur, frames = Blur(method, samples=_MANY, **options), neighbourly(range(4))  # pyright: ignore[reportArgumentType, reportCallIssue]
         return lambda number: blur(frames[number % len(frames)])
 
     return begin
@@ -65,7 +65,7 @@ def _unlocked(method: str) -> Callable[[], Step]:
     """Arrays that may change: uploaded for every frame."""
 
     def begin() -> Step:
-        blur, one = Blur(method, samples=_MANY), frame(1)  # pyright: ignore[reportArgumentType]
+        blur, one = Blur(method, samples=_MANY), frame(1)  # pyright: ignore[reportArgumentType, reportCallIssue]
         return lambda number: blur(replace(one, number=number))
 
     return begin
@@ -78,7 +78,7 @@ def _confidence() -> Step:
 
 def _scene(scene: str, method: str) -> Callable[[], Step]:
     def begin() -> Step:
-        blur = Blur(method, samples=_MANY)  # pyright: ignore[reportArgumentType]
+        blur = Blur(method, samples=_MANY)  # pyright: ignore[reportArgumentType, reportCallIssue]
         render = Render(builtin.make(scene), blur, size=SIZE, antialias=2)
         return lambda number: render(number % 24 / 24, number)  # what suits a moment is compiled
 

@@ -14,16 +14,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .._version import __version__
 from ..errors import InputError
 from ..io.frame_numbers import frame_path
 from ..io.pipes import STDOUT
 from ..io.suffixes import VIDEOS
-from ..run.report import Progress
 from . import terminal
 from .terminal import Tick
+
+if TYPE_CHECKING:
+    from ..run.report import Progress
 
 _BEGINNING = b'{"event": '  # of every line
 STATES = ("done", "skipped", "failed")

@@ -1,9 +1,7 @@
 // Motion of the picture: of blocks, raised, where that was chosen, else of dense inverse search.
 //#include common/frame.wgsl
-//#include flow/dense/sampling.wgsl
 //#include flow/dense/raising.wgsl
 
-@group(1) @binding(2) var small: texture_2d_array<f32>;     // stored as r32float; the middle level
 @group(1) @binding(3) var state: texture_2d<f32>;           // of that: to_prev, to_next [px]
 @group(1) @binding(4) var chosen: texture_2d<f32>;          // of that: 1 where its motion is taken
 @group(1) @binding(5) var motion: texture_2d<f32>;          // by dense inverse search

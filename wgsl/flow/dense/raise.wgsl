@@ -1,9 +1,7 @@
 // Motion of a small level, raised to a larger one.
 //#include common/frame.wgsl
-//#include flow/dense/sampling.wgsl
 //#include flow/dense/raising.wgsl
 
-@group(1) @binding(2) var small: texture_2d_array<f32>;     // stored as r32float
 @group(1) @binding(3) var state: texture_2d<f32>;           // of the small level: to_prev, to_next [px]
 @group(1) @binding(4) var output: texture_storage_2d<rgba32float, write>;
 

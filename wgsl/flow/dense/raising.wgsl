@@ -1,4 +1,7 @@
 // Motion of a small level at a pixel of a larger one: that of the likest of the nine small pixels around it.
+//#include flow/dense/sampling.wgsl
+
+@group(1) @binding(2) var small: texture_2d_array<f32>;     // stored as r32float; the small level
 
 const NEAR: i32 = 3;            // small pixels a side that are compared
 const AWAY: f32 = 1.5;          // levels of 255 that a small pixel of distance counts
