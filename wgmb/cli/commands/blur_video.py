@@ -159,7 +159,7 @@ def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -
 
 
 def _log_end(report: VideoReport) -> None:
-    """Log a video that is there, with what was lost of it."""
+    """Log a video that exists, with its losses."""
     status = "done" if report.is_new else "skipped"
     run_log.video(report.path, report.output, status, report.seconds, report.loss)
 
