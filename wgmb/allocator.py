@@ -1,4 +1,4 @@
-"""Memory of this process: how much it holds, and bounds of what glibc's allocator keeps for itself.
+"""Memory of this process: how much it holds, and bounds of glibc's own share.
 
 Each thread has an arena of its own there, whose end may hold 64 MiB that nobody uses once large
 arrays have come and gone.

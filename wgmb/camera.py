@@ -145,7 +145,7 @@ class Reprojections:
         side: int,
         bodies: np.ndarray | None = None,
     ) -> np.ndarray:
-        """(n, 2) way of what is at pixels x, y [px] to the previous (side -1), next (1) frame.
+        """(n, 2) motion of surfaces at pixels x, y [px] to the previous (side -1), next (1) frame.
 
         `bodies`: (n,) object index of each, 0 for the world. NaN where there is no such frame, or
         it is behind its camera.

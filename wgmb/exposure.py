@@ -36,9 +36,9 @@ def cells(times: Sequence[float], at: float, interval: float, shutter: Shutter) 
     """The cells of the exposure of an output frame.
 
     `times`: of the input frames [s], ascending, with no cut between them. `at`: of the output frame
-    [s]; `interval` between output frames [s], which `shutter` is in. What is exposed before the
-    first cell and after the last one is left out; if that is all, the nearest frame is taken as it
-    is. InputError for a rolling shutter, and for times that do not ascend.
+    [s]; `interval` between output frames [s], which `shutter` is in. Exposure before
+    the first cell and after the last one is left out; if that is all, the nearest frame is taken as
+    it is. InputError for a rolling shutter, and for times that do not ascend.
     """
     if shutter.rolling is not None:
         raise InputError("a rolling shutter needs frames of the output's own rate")

@@ -93,7 +93,7 @@ class Frame:
     diffuse_color: Floats | None = None
     """(height, width, 3) float, linear: the colour of matt surfaces (albedo)."""
     glossy_light: Floats | None = None
-    """(height, width, 3) float, linear: what glossy surfaces reflect, before `glossy_color`."""
+    """(height, width, 3) float, linear: light reflected by gloss, before `glossy_color`."""
     glossy_color: Floats | None = None
     """(height, width, 3) float, linear: the colour of glossy surfaces."""
     bad: dict[str, int] = field(init=False, default_factory=dict)

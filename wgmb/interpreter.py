@@ -1,7 +1,7 @@
 """The Python that runs wgmb's commands, and every other one that it starts.
 
 None of them imports a module from the current folder, where files of strangers lie. This module
-imports what is there before a folder is searched, and nothing else.
+imports only modules that are found before a folder is searched.
 """
 
 import os
@@ -64,8 +64,8 @@ def handle_signals(handler: "Callable[..., object] | int") -> None:
     """Set the handler of the signals that end a program.
 
     They are Ctrl-C, SIGTERM, and SIGHUP, as a terminal sends that is closed. SIGHUP stays ignored
-    where nohup has it ignored; SIGINT does not, which a shell has ignored by what runs in the
-    background. ValueError on any but the main thread.
+    where nohup has it ignored; SIGINT does not, as a shell has background processes ignore it.
+    ValueError on any but the main thread.
     """
     import signal  # by now, it is not searched for in the current folder
 

@@ -2,7 +2,7 @@
 
 Every metric takes `picture` and `truth`, (height, width, 3 or 4) linear light of the same size,
 and returns one number. Alpha is left out: premultiplied colour is the picture over black.
-"Display" is what a screen shows: held to 0..1 and sRGB encoded.
+"Display" means display values: clamped to 0..1 and sRGB encoded.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _LUMA = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
 
 
 def display(picture: np.ndarray) -> np.ndarray:
-    """(height, width, 3) float32, 0..1: sRGB encoded (IEC 61966-2-1), what is not finite is 0."""
+    """(height, width, 3) float32, 0..1: sRGB encoded (IEC 61966-2-1), 0 where it is not finite."""
     return srgb(_linear(picture))
 
 
@@ -61,8 +61,8 @@ def ssim(picture: np.ndarray, truth: np.ndarray) -> float:
 def flip(picture: np.ndarray, truth: np.ndarray) -> float:
     """FLIP on the display, its mean: 0 is the same, 1 as different as can be.
 
-    P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020: what a
-    viewer sees when the two alternate, at 67 pixels a degree.
+    P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020: the
+    difference that a viewer sees when the two alternate, at 67 pixels a degree.
     """
     return _flip(picture, truth)[1]
 

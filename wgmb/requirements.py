@@ -1,7 +1,7 @@
 """Requirements of an extra: those that the metadata of the installed wgmb lists, and which are met.
 
-`packaging` does the whole of this, and is not among the packages of the core. What is not
-understood here counts as not met, so that pip judges it.
+`packaging` does the whole of this, and is not among the packages of the core. A requirement
+that is not understood here counts as not met, so that pip judges it.
 """
 
 from __future__ import annotations

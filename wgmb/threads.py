@@ -85,8 +85,9 @@ class ThreadClock:
 def apart(work: Callable[[], _Item], check: Callable[[], None] = lambda: None) -> _Item:
     """The result of `work`, made in a thread of its own, so that Ctrl-C does not wait for it.
 
-    What `work` raises is raised here. `check` is called every 0.05 s, and may raise: that ends the
-    wait, as an interruption does. The thread then goes on until `work` ends, or the program does.
+    Exceptions of `work` are raised here. `check` is called every 0.05 s, and may raise: that ends
+    the wait, as an interruption does. The thread then goes on until `work` ends, or the program
+    does.
     """
     done: queue.SimpleQueue[list[_Item] | BaseException] = queue.SimpleQueue()
 
@@ -112,8 +113,8 @@ def ahead(
 ) -> Generator[_Item, None, None]:
     """The items, up to `count` of them made beforehand in a thread of their own.
 
-    What the thread raises is raised here. When nobody reads on, it ends after the item that it is
-    making, for which one waits at most `patience` [s], and closes a generator. An item that was
+    Exceptions of the thread are raised here. When nobody reads on, it ends after the item that it
+    is making, for which one waits at most `patience` [s], and closes a generator. An item that was
     given is not held here. `check` is called every 0.05 s while an item is waited for, and may
     raise. With a count of 0 there is no thread, and each item is made when it is asked for.
     """
@@ -182,10 +183,10 @@ def _has_room(room: threading.Semaphore, is_over: Callable[[], bool]) -> bool:
 class Behind(Generic[_Item]):
     """Calls `work` with items in a thread of its own, in their order.
 
-    `with Behind(work) as put:`; what it raises is raised by the next `put`, or at the end. What was
-    put is worked on if the caller fails, but not after an interruption. `put` returns when fewer
-    than `count` items wait, so that `count` wait or are being made by the caller, beside the one
-    that is worked on.
+    `with Behind(work) as put:`; its exceptions are raised by the next `put`, or at the end. Items
+    already put are worked on if the caller fails, but not after an interruption. `put` returns when
+    fewer than `count` items wait, so that `count` wait or are being made by the caller, beside the
+    one that is worked on.
     """
 
     def __init__(self, work: Callable[[_Item], None], count: int = 1, name: str = "behind"):

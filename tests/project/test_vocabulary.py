@@ -76,3 +76,41 @@ def test_light_before_and_after_a_blur_is_named_in_few_modules():
     """
     named = [f for f in PACKAGE.rglob("*.py") if re.search(r"\bhighlights\b", f.read_text("utf-8"))]
     assert len(named) <= 9, named
+
+
+HEADLESS = re.compile(r"\bwhat (?!if\b|about\b|to\b|was (?:expected|given|found)\b|came\b)", re.I)
+"""A clause in the place of a noun: "what rests" for static surfaces, "what is lost" for losses."""
+
+QUESTION = re.compile(
+    r"\b(?:sa(?:y|ys|id|ying)|tell|tells|told|know|knows|known|show|shows|showing|see|sees|asks?|asked|"
+    r"explains?|explained|decides?|decided|lists?|names?|named|checks?|stat(?:e|es|ing)|describes?|"
+    r"learn|chooses?|understand|judges?|reports?|guess)\W+$",
+    re.I,
+)
+"""Words before an indirect question, which is no such clause: "an error says what was wrong"."""
+
+
+def headless(text: str) -> list[str]:
+    """The beginnings of the headless clauses of a text."""
+    found = HEADLESS.finditer(text)
+    return [text[m.start() : m.end() + 40] for m in found if not QUESTION.search(text[: m.start()])]
+
+
+def texts(file: Path) -> Iterator[str]:
+    """Docstrings and messages of a file."""
+    for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            yield node.value
+
+
+def test_headless_clauses_are_rare():
+    """At most 4 in 10,000 words; see HEADLESS."""
+    written = [text for file in sorted(PACKAGE.rglob("*.py")) for text in texts(file)]
+    found = [clause for text in written for clause in headless(text)]
+    words = sum(len(text.split()) for text in written)
+    assert len(found) <= 4e-4 * words, "\n".join(found)
+
+
+def test_questions_are_no_headless_clauses():
+    assert headless("It follows what rests.") and headless("What is lost is named.")
+    assert not headless("An error says what was wrong.")

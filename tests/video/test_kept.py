@@ -257,7 +257,7 @@ def test_a_projection_and_two_views_go_through_pipes_or_are_said(tmp_path, devic
     assert stated.projection is not None and stereo_mode(stated) == "top_bottom"
     said = piped(source, STDOUT, stdout=io.BytesIO()).left_out
     assert [line.split(";")[0] for line in said] == [
-        "YUV4MPEG2 states no colours, and these are not what players assume",
+        "YUV4MPEG2 states no colours, and players assume others",
         "its projection (360 degrees) is not kept (.mkv and .mp4 hold most)",
         "that it has two views (top bottom) is not kept (.mkv holds most)",
     ]

@@ -112,7 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _code(words: list[str]) -> int:
-    """Run a command; what fails is an error in one line, and an exit code."""
+    """Run a command; a failure is an error in one line, and an exit code."""
     try:
         handle_signals(terminal.interrupt)
         warnings.simplefilter("ignore")  # libraries' remarks on damaged files; ours are errors
@@ -284,7 +284,7 @@ def _config(words: list[str]) -> tuple[Dict, ...]:
 
 
 def _check_tables(tables: dict[str, object], command: str) -> None:
-    """InputError for what no command would read in a --config file."""
+    """InputError for entries of a --config file that no command reads."""
     for name, table in tables.items():
         if not isinstance(table, dict):
             raise InputError(f"{name} is in no table; write it below [{command}]")

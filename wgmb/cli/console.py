@@ -103,7 +103,7 @@ def cuts_told(cuts: Iterable[int], noun: str) -> str:
 
 
 def pictures_told(report: VideoReport, fills: bool) -> list[str]:
-    """Lines on what was seen in a video, some empty; `fills`: repeated pictures are left out."""
+    """Lines on peculiarities of a video, some empty; `fills`: repeated pictures are left out."""
     flashes = ", ".join(map(str, report.flashes))
     return [
         cuts_told(report.cuts, "picture") if report.cuts else "",

@@ -1,4 +1,4 @@
-"""The time that a long run will take, told as soon as it shows, with what would be quicker."""
+"""The estimated time of a long run, reported as early as possible, with quicker settings."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Estimate:
     """A `progress` that passes on to `tell`, and says once if the frames left take long.
 
     Two frames are no measure: the first one, which also started all, and the slowest one after it,
-    which may have compiled a shader. `total`: number of frames; `quicker`: what takes less time;
-    `say`: takes the line.
+    which may have compiled a shader. `total`: number of frames; `quicker`: settings that take less
+    time; `say`: takes the line.
     """
 
     def __init__(

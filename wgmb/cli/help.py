@@ -41,7 +41,7 @@ FIRST = (
     "--resume",
     "--overwrite",
 )
-"""The order in MAIN, after what has no name; a command's other options follow."""
+"""The order in MAIN, after positional arguments; a command's other options follow."""
 FEW = 18
 """A command with so many options at most shows all of them."""
 FEW_EXAMPLES = 3
@@ -93,7 +93,7 @@ class CommandHelp(DefaultFormatter):
         return sum(group[0].name != MAIN.name for group in groups)
 
     def render_description(self, console: Any, options: Any, description: Any) -> None:
-        """Print what the command does, and examples."""
+        """Print the command's description and examples."""
         paragraphs, examples = about(self.program[self.name])
         for paragraph in paragraphs:
             console.print(f"{paragraph}\n", markup=False, highlight=False)
@@ -106,7 +106,7 @@ class CommandHelp(DefaultFormatter):
 
 
 def _with_words(entry: HelpEntry) -> HelpEntry:
-    """The entry with what its value is: N, X, TEXT, PATH, or the choices where they are short."""
+    """The entry with the kind of its value: N, X, TEXT, PATH, or its choices if they are short."""
     value, choices = entry.metavar or "", entry.choices or ()
     words = [_KINDS.get(word, word) for word in value.removesuffix("...").split("|")]
     listed = "|".join([*(word for word in words if word != "CHOICE"), *choices])

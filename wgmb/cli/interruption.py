@@ -4,7 +4,7 @@ The first signal is an exception on the main thread, and the run ends as after a
 exception is heard within a call of the system or of a library: while a disk does not answer, or a
 frame is on the GPU. Signals are therefore written to a pipe as well, by Python's own handler in C,
 and a thread reads it: GRACE seconds after the first one, or at once with the second, it removes
-what is unfinished and ends the process.
+unfinished files and ends the process.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ def watch() -> None:
 
 
 def finish() -> None:
-    """Remove what a command has left, which has said that it was interrupted."""
+    """Remove the leftovers of a command that has reported its interruption."""
     _said.append(True)
     leftovers.remove_all(_REMOVING)
 
 
 def end() -> None:
-    """Remove what is unfinished, say so, and end the process now."""
+    """Remove unfinished files, say so, and end the process now."""
     try:
         leftovers.remove_all(_REMOVING)
         if not _said:

@@ -1,4 +1,4 @@
-"""`--log-json`: what a run does, for machines; each event is a line of JSON.
+"""`--log-json`: the events of a run for machines, a line of JSON each.
 
 docs/reference/log-json.md describes the events. A command opens its log before it does anything
 else, and app.py ends it with the exit code; there is one at most in a process.
@@ -90,7 +90,7 @@ def _opened(path: Path) -> int:
 def start(
     inputs: Sequence[str | Path], output: str | Path, settings: Mapping[str, Any], total: int | None
 ) -> None:
-    """Log what is about to be made; `total`: number of frames, None where nobody knows."""
+    """Log the beginning of an output; `total`: number of frames, None if unknown."""
     if _log is not None:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         _log.write(
@@ -108,7 +108,7 @@ def start(
 def logged(tick: Tick | Progress, output: str | Path, first: int = 0) -> Callable[[int, str], None]:
     """A progress that also logs each frame, and the file that it is in.
 
-    `first`: what is added to a frame's number for its number in the names of files.
+    `first`: the offset from a frame's number to its number in the names of files.
     """
 
     def tick_and_log(number: int, state: str) -> None:

@@ -32,7 +32,7 @@ def interrupt(*_: object) -> None:
 
 
 def hush(unraisable: Any) -> None:
-    """Replace sys.unraisablehook: after an interruption, what a destructor raises is not printed.
+    """Replace sys.unraisablehook: after an interruption, exceptions of destructors are not printed.
 
     It is the interruption itself, or comes from an object that it left half made.
     """
@@ -144,7 +144,7 @@ def _number(stream: Any) -> int | None:
 
 
 def drop_streams() -> None:
-    """Before the process ends: what cannot be handed over must not change its exit code."""
+    """Before the process ends: output that cannot be written must not change its exit code."""
     for name in ("stdout", "stderr"):
         try:
             getattr(sys, name).flush()
@@ -189,7 +189,8 @@ def progress(frames: int, quiet: bool, doing: str = "blurring") -> Iterator[Tick
 def share_of(tick: Tick, frames: int, name: str) -> Iterator[Callable[[int, str], None]]:
     """Yield a function to call after every frame of a share of a bar, under a name of its own.
 
-    `tick`: what `progress` yielded. Frames of which it was not told count as skipped in the end.
+    `tick`: the function that `progress` yielded. Frames of which it was not told count as skipped
+    in the end.
     """
     count = itertools.count()
 

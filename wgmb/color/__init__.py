@@ -1,1 +1,1 @@
-"""Colours: spaces, transfer, primaries, and what a display shows."""
+"""Colours: spaces, transfer, primaries, and display values."""

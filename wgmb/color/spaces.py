@@ -114,8 +114,8 @@ class ColorConfig:
 
         In this order: `colorInteropID`, `oiio:ColorSpace` or `colorspace` where the config has
         a space of that name or alias (not: role); `acesImageContainerFlag` of 1 is ACES2065-1
-        (SMPTE ST 2065-4); `chromaticities`; else linear Rec.709, which is what an EXR means that
-        says nothing.
+        (SMPTE ST 2065-4); `chromaticities`; else linear Rec.709, the meaning of an EXR without
+        any of these.
         """
         for key in _NAMED_BY:
             value = attributes.get(key)

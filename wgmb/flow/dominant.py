@@ -123,7 +123,7 @@ def settled(
 
 
 def _read(passes: FlowPasses, thin: wgpu.GPUTexture) -> np.ndarray:
-    """(count, 4) what a pass wrote of a few pixels."""
+    """(count, 4) the output of a pass for a few pixels."""
     return passes.images.download(passes.device.create_command_encoder(), thin).reshape(-1, 4)
 
 

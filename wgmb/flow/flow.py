@@ -18,7 +18,7 @@ class Flow:
     For each pixel one sloped displacement is searched that explains the frame before and the frame
     after, one of which may hide it: a full search on the coarsest level, then sweeps (Barnes et
     al., "PatchMatch", 2009; planes: Bleyer, Rhemann and Rother, "PatchMatch Stereo", 2011) on ever
-    finer ones. Pixels that are not found again move as what they belong to.
+    finer ones. Pixels that are not found again move as the surface they belong to.
 
     `quality`: "best", "fast", which ends at half the size, or "draft", which searches pictures of
     at most 440 px along the longer side. `device`: your own wgpu device, the name of an adapter, or

@@ -1,7 +1,7 @@
 """The motion of most of a picture: a homography, found in spite of all that moves otherwise.
 
 RANSAC (Fischler and Bolles, "Random Sample Consensus", 1981) with a fixed number of fixed
-samples, then least squares on what agrees with the best of them.
+samples, then least squares on the points that agree with the best of them.
 """
 
 from __future__ import annotations

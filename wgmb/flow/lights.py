@@ -62,7 +62,7 @@ def follow_lights(
 
     `here`, `near`, `far`: their lights, as `find_lights` gives them; `factor`: the displacement to
     the far frame over that to the near one. Lights that are seen in all three and move evenly come
-    first; what is left is matched with what is left in one of them, the nearest first.
+    first; the others are matched with those left in one of them, the nearest first.
     """
     pairs = []
     for n, light in enumerate(here):
@@ -109,7 +109,7 @@ def move_lights(
 ) -> wgpu.GPUTexture:
     """States in which the lights that the search missed move; the given ones are taken back.
 
-    `lights`: what `follow_lights` found; `matched`: the bindings of match.wgsl.
+    `lights`: the result of `follow_lights`; `matched`: the bindings of match.wgsl.
     """
     if not len(lights):
         return states

@@ -1,4 +1,4 @@
-"""Pixels that are not found again take over the state of what they belong to."""
+"""Pixels that are not found again take over the state of the surface they belong to."""
 
 from __future__ import annotations
 

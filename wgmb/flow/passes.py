@@ -73,7 +73,7 @@ class FlowPasses:
         return gpu.uniform(self.device, f"flow/{file}", struct, **values)
 
     def take(self, size: tuple[int, int], kind: tuple[str, int]) -> wgpu.GPUTexture:
-        """A texture of a format and so many layers; what is in it is undefined."""
+        """A texture of a format and so many layers; its contents are undefined."""
         if free := self._free.get((size, kind)):
             return free.pop()
         gpu.check_size(self.device, *size)

@@ -1,6 +1,6 @@
 """Flow of the frames of a shot: every stage of a frame is made once, from those of its neighbours.
 
-What a frame's stages are made of, so that the result is a function of its number alone:
+Inputs of a frame's stages, so that the result is a function of its number alone:
 
 searched(n, coarsest): pictures n - 1, n, n + 1;
 searched(n, level): mended(n, coarser), and searched(n - 1, coarser) and (n + 1, coarser), carried;
@@ -298,7 +298,7 @@ class Shot:
     def _raised(
         self, number: int, views: Views, small: Motion, states: wgpu.GPUTexture
     ) -> tuple[Motion, wgpu.GPUTexture]:
-        """Motion and states at the picture's own size; what was searched is taken back."""
+        """Motion and states at the picture's own size; the search's textures are returned."""
         assert self._size is not None
         display, here = self._results["display", number, 0], (self._features(number) or [])[0]
         larger, depth = raised(self._passes, display, here, states, small.depth)
@@ -333,7 +333,7 @@ class Shot:
         return states
 
     def _forget(self, number: int) -> None:
-        """Let go of what the frames after and before this one will not need."""
+        """Release data that the frames after and before this one will not need."""
         for key in list(self._results):
             stage, other, level = key
             if abs(other - number) > KEPT[stage] + level:

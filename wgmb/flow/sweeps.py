@@ -60,7 +60,7 @@ def half_sweep(
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
 
-    `is_known`: what the states of this colour cost is in `passes.costs`, from an earlier pass.
+    `is_known`: the costs of this colour's states are in `passes.costs`, from an earlier pass.
     """
     entry = "refine" if number % 2 else "propagate"
     grid = -(-size[0] // 2), size[1]

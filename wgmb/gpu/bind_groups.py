@@ -18,7 +18,7 @@ _NOTHING = 256  # bytes of a buffer that stands for none
 
 
 class BindGroups:
-    """Bind groups by what they bind. They keep nothing alive in Python: once a view, a buffer or
+    """Bind groups by their resources. They keep nothing alive in Python: once a view, a buffer or
     a sampler is let go of elsewhere, the groups that bind it are let go of too.
     """
 

@@ -222,6 +222,6 @@ def _is_of_wgpu(error: Exception) -> bool:
 
 
 def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
-    """Run what was recorded. The one place that submits."""
+    """Submit the recorded commands. The one place that submits."""
     claim()
     device.queue.submit([encoder.finish() for encoder in encoders])

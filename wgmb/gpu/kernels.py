@@ -1,6 +1,6 @@
 """Kernels: one compiled WGSL file each, its passes recorded by the names of its bindings.
 
-A caller says what a pass reads and writes; the kernel makes what its WGSL declares: uniforms from
+A caller says what a pass reads and writes; the kernel makes the rest by its WGSL: uniforms from
 their fields, buffers from arrays, stand-ins for None, and workgroups from a size. `Kernel.prepared`
 is where every dispatch of wgmb passes through, as a `Pass` that can be recorded more than once.
 """
@@ -25,7 +25,7 @@ Size = tuple[int, int]
 BufferPart = dict[str, Any]
 """A part of a buffer: "buffer", "offset" and "size" [bytes], as wgpu takes it."""
 Texels = Mapping[str, Any]
-"""Formats by the aliases of a file, and what will be bound by the names of its bindings."""
+"""Formats by the aliases of a file, and resources by the names of its bindings."""
 _MADE = wgpu.GPUTextureView, wgpu.GPUBuffer, wgpu.GPUSampler
 
 
@@ -256,7 +256,7 @@ def kernel(
 
     `file`: also the absolute path of a shader elsewhere, which may include those of wgsl/ too.
 
-    `texels`: the storage texel formats (`Output`); also what will be bound, as the format of a
+    `texels`: the storage texel formats (`Output`); also the resources to bind, as the format of a
     texture that is "stored as given" is that of its binding. `constants`: the overrides.
     """
     formats = []

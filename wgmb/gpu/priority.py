@@ -1,4 +1,4 @@
-"""Priority of threads, a software driver's too: what is computed beside a window yields to it."""
+"""Priority of threads, a software driver's too: work beside a window yields to it."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class ScratchBuffer:
         self._buffer: wgpu.GPUBuffer | None = None
 
     def at_least(self, size: int) -> wgpu.GPUBuffer:
-        """The buffer, of `size` bytes or more; what is in it is undefined."""
+        """The buffer, of `size` bytes or more; its contents are undefined."""
         most = self._device.limits["max-storage-buffer-binding-size"]
         if size > most:
             raise InputError(f"the image needs a buffer of {size} bytes, the adapter allows {most}")

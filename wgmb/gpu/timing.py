@@ -198,7 +198,7 @@ def clock(device: wgpu.GPUDevice) -> Clock:
 
 
 def medians(runs: list[dict[str, float]]) -> dict[str, float]:
-    """Of what several runs `read`, by name."""
+    """Of the results of `read` of several runs, by name."""
     return {label: float(np.median([run[label] for run in runs])) for label in runs[0]}
 
 

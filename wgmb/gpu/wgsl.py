@@ -88,7 +88,7 @@ class WgslSource:
         return _names(self.text)[1]
 
     def flexible(self) -> frozenset[str]:
-        """Bindings that are "stored as given": their format is that of what is bound."""
+        """Bindings that are "stored as given": their format is that of the resource."""
         return _names(self.text)[2]
 
     def entry_points(self) -> list[str]:
@@ -167,7 +167,7 @@ def texel_aliases(text: str) -> dict[str, str]:
 
 @cache
 def load(name: str) -> WgslSource:
-    """Read `wgsl/<name>`, or a file with an absolute path, and append what it includes.
+    """Read `wgsl/<name>`, or a file with an absolute path, and append its includes.
 
     WGSL does not care about the order of declarations, so includes go to the end
     and the file keeps its own line numbers in error messages. A file outside of wgsl/ may include

@@ -1,1 +1,1 @@
-"""A frame on the GPU: its textures, constants and motion, and what surrounds a method."""
+"""A frame on the GPU: its textures, constants and motion, and the passes around a method."""

@@ -48,7 +48,7 @@ class HoldoutPass:
         output: View,
         texel: str,
     ) -> None:
-        """Record `output`, of format `texel`: the result, with what was held out put back."""
+        """Record `output`, of format `texel`: the result, with the holdouts put back."""
         self._kernel(holdout, texel).run(
             encoder, "after", bindings,
             color=color, holdout=holdout, blurred=blurred, weight=None, output=output,

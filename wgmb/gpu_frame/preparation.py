@@ -54,7 +54,7 @@ class Preparation:
         bindings: gpu.FrameBindings,
         views: Sequence[tuple[int, FrameViews]],
     ) -> tuple[PreparedFrame, ...]:
-        """Record what frames are to methods: `views` are the frame that is blurred and its
+        """Record the inputs of methods: `views` are the frame that is blurred and its
         neighbours, each after its offset. If one of them is masked, all have weights."""
         masked = any(frame.holdout is not None or frame.check for _, frame in views)
         return tuple(
@@ -91,5 +91,5 @@ class Preparation:
         output: View,
         texel: str,
     ) -> None:
-        """Record `output`, of format `texel`: the blurred frame with what was held out."""
+        """Record `output`, of format `texel`: the blurred frame with its holdouts."""
         self._holdout.after(encoder, bindings, frame.color, frame.holdout, blurred, output, texel)

@@ -5,7 +5,7 @@ counts as unchanged only while its arrays are the same objects and read-only:
 
 - `Clip` keeps the last three files read, and the frames made of them, by number;
 - `Residency` uploads the arrays of a locked frame once, and knows them again by identity;
-- a method may keep what it derived from a frame's views, by their `key` (see FrameViews);
+- a method may keep data derived from a frame's views, by their `key` (see FrameViews);
 - `TexturePool` keeps textures by name, so that the next frame's go into the same ones.
 """
 
@@ -49,7 +49,7 @@ class _ResidentFrame:
 class Residency:
     """Uploads frames, those that are locked once.
 
-    `wanted`: what the method needs and uses; `most`: frames that it takes at once.
+    `wanted`: layers that the method needs or uses; `most`: frames that it takes at once.
     """
 
     def __init__(self, images: TexturePool, wanted: frozenset[str], most: int):
@@ -76,7 +76,7 @@ class Residency:
         return views
 
     def forget(self) -> None:
-        """Upload everything again; for when what was recorded may not have been done."""
+        """Upload everything again, because recorded commands may not have been executed."""
         self._resident.clear()
 
     def _place_of(self, frame: Frame) -> str | None:

@@ -33,7 +33,7 @@ FORMAT = "rgba16float"  # of results: every device can write and filter it
 
 
 class MotionBlurPass(EffectPass):
-    """Blurs what moved since the last frame that was drawn.
+    """Blurs the motion since the last frame that was drawn.
 
     `camera`: of the scene. `method`: one that takes frames (tap, tiles, fusion, reproject, gather).
     With `renderer` and `scene`, objects whose material writes the pick buffer (`pick_write=True`)

@@ -47,7 +47,7 @@ def blur(
     that the first frame's properties state, or that players assume.
 
     Returns a clip of the same format; each frame has the properties of the clip's at that time.
-    Frames can be asked for in any order. vs.Error in one line for what does not fit.
+    Frames can be asked for in any order. vs.Error in one line for arguments that do not fit.
 
     Example: wgmb.hosts.vapoursynth.blur(clip, shutter=180, fps=60).set_output()
     """
@@ -71,7 +71,7 @@ def blur(
 
 
 def coding_of(frame: vs.VideoFrame) -> Coding:
-    """The coding that a frame's properties state, and what players assume for the rest."""
+    """The coding that a frame's properties state, with players' assumptions for the rest."""
     form, properties = frame.format, cast(Mapping[str, Any], frame.props)
     families: dict[int, Literal["rgb", "grey", "yuv"]] = {vs.RGB: "rgb", vs.GRAY: "grey"}
     model = families.get(int(form.color_family), "yuv")

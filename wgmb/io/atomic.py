@@ -162,9 +162,9 @@ def is_temporary(name: str) -> bool:
 
 
 def sweep(folder: Path, names: Collection[str] | Callable[[str], bool]) -> None:
-    """Remove what dead processes of this host left of files with these names.
+    """Remove unfinished files with these names of dead processes of this host.
 
-    `names`: them all, or what tells whether a name is one of them.
+    `names`: all of them, or a function that tells whether a name is one of them.
     """
     left = [m for m in map(_TEMPORARY.fullmatch, os.listdir(folder)) if m and m["host"] == _HOST]
     if not left:

@@ -33,7 +33,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Data:
-    """Contents of a file: (height, width) float32 by channel; what it says of them, if it does."""
+    """Contents of a file: (height, width) float32 by channel; its own description of them."""
 
     planes: dict[str, np.ndarray]
     unit: Unit | None = None

@@ -131,7 +131,7 @@ def _transmittance(alpha: np.ndarray, starts: np.ndarray, counts: np.ndarray) ->
 
 
 def _summed(samples: np.ndarray, transmittance: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The sum of what is seen of every pixel's samples."""
+    """The sum of the visible parts of every pixel's samples."""
     of = np.repeat(np.arange(len(counts)), counts)
     shares = np.zeros(len(samples))
     np.multiply(

@@ -33,7 +33,7 @@ COMPRESSIONS = {
     "dwaa": OpenEXR.DWAA_COMPRESSION,
     "dwab": OpenEXR.DWAB_COMPRESSION,
 }
-"""The library's names of what every program reads; see also `check_compression`."""
+"""The library's names of compressions that every program reads; see also `check_compression`."""
 _SAME = "same"
 _MAGIC = b"\x76\x2f\x31\x01"
 _DEEP = OpenEXR.deepscanline, OpenEXR.deeptile
@@ -145,7 +145,7 @@ def read(
 
 
 def _fill(path: Path, part: Part, stored: Any, data_layers: Collection[str]) -> None:
-    """Give a part, promised by its header, the planes of what is stored."""
+    """Give a part, promised by its header, the stored planes."""
     sampling: dict[str, tuple[int, int]] = {}
     for name in part.channels:
         channel = stored.channels.get(name)
@@ -247,7 +247,7 @@ def new(rgba: np.ndarray, attributes: dict[str, Any] | None = None) -> Exr:
 
 
 def to_half(values: np.ndarray) -> np.ndarray:
-    """Float16, with what is too large for it held to its largest value."""
+    """Float16, with larger values clamped to its largest one."""
     limit = np.finfo(np.float16).max
     return np.clip(values, -limit, limit).astype(np.float16)
 

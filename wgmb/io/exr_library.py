@@ -1,4 +1,4 @@
-"""The OpenEXR library among threads: its pool, what it prints, forks and the end of the process.
+"""The OpenEXR library among threads: its pool, its messages, forks and the end of the process.
 
 Any number of threads may be inside the library at once. A fork and the end of the process wait
 until all have left it: a child would wait for threads that it does not have, and a thread that
@@ -85,7 +85,7 @@ if hasattr(os, "register_at_fork"):
 
 
 class _Sieve:
-    """A text stream that keeps what the library says from coming through."""
+    """A text stream that holds back the library's messages."""
 
     def __init__(self, stream: Any, heard: dict[int, list[str]]):
         self.stream, self._heard = stream, heard
@@ -105,7 +105,7 @@ class _Sieve:
 
 
 class _Hush:
-    """Holds back what the library prints. All threads share one redirection: the first to come
+    """Holds back the library's output. All threads share one redirection: the first to come
     begins it, the last to leave ends it.
     """
 
@@ -175,8 +175,8 @@ def _apart() -> bool:
 
 
 hushed = _Hush()
-"""`with hushed() as heard:` within `inside()`: what the library tells this thread lands in `heard`.
+"""`with hushed() as heard:` within `inside()`: `heard` gets the library's messages to this thread.
 
-What native code prints on descriptors 1 and 2 gets lost then, whoever it is; so that is held back
-only where Python's own streams live elsewhere, to which the command line moves them.
+All output of native code on descriptors 1 and 2 gets lost then; so it is held back only where
+Python's own streams live elsewhere, to which the command line moves them.
 """

@@ -92,7 +92,7 @@ def _title(path: str | Path) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name as one of a layer: without %V, and `_` for what stands between words."""
+    """A name as one of a layer: without %V, and `_` for the characters between words."""
     return re.sub(r"[\W_]+", "_", name.replace("%V", "")).strip("_")
 
 
@@ -214,7 +214,7 @@ def _frame_set(of: str | list[int]) -> FrameSet:
 
 
 def numbered(numbers: list[int], noun: str = "frame") -> str:
-    """Numbers for people, with what has them: frame 9, frames 9-11."""
+    """Numbers for people, with their noun: frame 9, frames 9-11."""
     return f"{noun}{'' if len(numbers) == 1 else 's'} {frame_list(numbers)}"
 
 

@@ -28,7 +28,7 @@ LARGEST_INDEX = 64 << 20  # bytes that a compressed index may unpack to
 
 
 def unpacked(size: tuple[int, int], channels: int) -> int:
-    """Bytes of so many channels of `size` pixels as float32, which is what they become here."""
+    """Bytes of so many channels of `size` pixels as float32, their form here."""
     return 4 * size[0] * size[1] * channels
 
 
@@ -106,7 +106,7 @@ def check_packets(path: Path, count: int, size: int, stored: int) -> None:
     """Raise InputError where `count` packets of `size` bytes in all cannot come from a file.
 
     Each stands for a byte of it at least, and all of them are 500 times as long at most, as where a
-    container compresses what is black.
+    container compresses black areas.
     """
     if count > stored or size > _TIMES * stored:
         raise InputError(

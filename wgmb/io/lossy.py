@@ -1,7 +1,7 @@
 """Lossy compression of EXR files: pictures take it, and data layers are left as they are.
 
-Vectors, depth, normals, ids: what is stored as numbers is put into a part of its own without loss,
-beside the picture's part. OpenEXR's technical introduction says which channels each compression
+Numbers (vectors, depth, normals, ids) are stored in a part of their own without loss, beside the
+picture's part. OpenEXR's technical introduction says which channels each compression
 changes.
 """
 

@@ -21,7 +21,7 @@ def is_pipe(name: str) -> bool:
 
 
 class PipeWriter:
-    """An unbuffered stream that takes all of what it is given.
+    """An unbuffered stream whose `write` takes all bytes.
 
     OSError that says how many pictures were written, if the stream's reader is gone.
     """

@@ -1,4 +1,4 @@
-"""The record that every result carries: settings, what was read, and a checksum of the file.
+"""The record that every result carries: settings, inputs, and a checksum of the file.
 
 A record is JSON and stands in the file as it is: in an EXR as the attribute `wgmb`, in a PNG as a
 text of that keyword, in a TIFF as its description, in a JPEG as its comment, in a video in a block

@@ -1,4 +1,4 @@
-"""Numbers that PNG, JPEG and TIFF files state, compared with what the files hold.
+"""Numbers that PNG, JPEG and TIFF files state, compared with their contents.
 
 Each function takes a whole file and returns one for the decoder, with only the chunks, segments or
 tags that its pixels need: the rest, texts and colour profiles among it, could unpack to gigabytes.

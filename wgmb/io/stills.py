@@ -61,7 +61,7 @@ def read(
     """(height, width, 3 or 4) float32, linear, premultiplied.
 
     `max_mb`: megabytes that it may unpack to. `space`: of the samples, instead of sRGB or, of
-    floats, linear light; what comes back is in `space.config.scene_linear`. `InputError`
+    floats, linear light; the result is in `space.config.scene_linear`. `InputError`
     names the file where it is missing, damaged, cut off, no picture or beyond that limit, and
     where memory is short.
     """

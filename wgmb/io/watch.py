@@ -1,6 +1,6 @@
 """A library's reading of an index, watched from beside it: memory, time, and interruptions.
 
-What a file states is compared with its length where its form is known here (limits.py). FFmpeg
+Stated numbers are compared with the file's length where its form is known here (limits.py). FFmpeg
 reads a hundred forms; this bounds them all.
 """
 

@@ -60,8 +60,8 @@ def bench(
 
     `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
     would take longer, and is left out, which `notes` say, where three frames would, going by
-    smaller figures; so is what the memory does not hold. What is interrupted (Ctrl-C) has the
-    figures up to then.
+    smaller figures; so are sizes that the memory does not hold. An interrupted bench (Ctrl-C) has
+    the figures up to then.
     """
     if rounds < 1:
         raise InputError(f"rounds must be 1 or more, got {rounds}")
@@ -172,7 +172,7 @@ class _Matrix:
             )
 
     def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
-        """Refuse what will take too long, or more memory than there is."""
+        """Refuse runs that take too long, or more memory than there is."""
         if (seconds := _HEAVY * self._frame(name, size, samples)) > self.limit:
             raise InputError(f"{_HEAVY} frames would take about {_about(seconds)}, more than "
                              f"{self.limit:g} s")  # fmt: skip

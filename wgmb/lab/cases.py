@@ -125,7 +125,7 @@ class SceneFrame:
 
 @dataclass(frozen=True)
 class Case:
-    """One picture to be made: from what, and what it should look like."""
+    """One picture to be made, with its inputs and its ground truth."""
 
     name: str
     frame: Frame

@@ -1,7 +1,7 @@
 """Compare methods with a ground truth, over scenes and shutters, at equal samples and time.
 
 A Laboratory lets every candidate make every case (cases.py) with several numbers of samples,
-judges (metrics.py) and times it; what it finds (results.py) is written as a page, JSON and CSV
+judges (metrics.py) and times it; its results (results.py) are written as a page, JSON and CSV
 by report.py.
 """
 

@@ -104,13 +104,13 @@ class Method(Protocol):
 
     It may also have `samples`, its own default number of them, and `adaptive`: it can take as
     many samples as each pixel's streak needs (AUTO of wgsl/common/shutter.wgsl); `quick`, options
-    of a cheaper picture, for the viewer while something moves; `confidence`, what the four channels
-    of its `show="confidence"` are called; `most_in_software`: the most samples it takes without a
-    GPU, if not as many as with one. Of how far it carries what moves
-    (see extent.py): `spread`, by default "along"; `margin(height)`: pixels that it looks at beyond
-    that, in pictures of this height [px]; `bend`: how far its paths leave the parabola through
-    three positions, as a share of half the acceleration. Where it uses neighbours, `reach`: frames
-    to either side that it takes, by default 1.
+    of a cheaper picture, for the viewer while something moves; `confidence`, the names of the
+    four channels of its `show="confidence"`; `most_in_software`: the most samples it takes without
+    a GPU, if not as many as with one. Of how far it carries colours (see extent.py): `spread`, by
+    default "along"; `margin(height)`: pixels that it looks at beyond that, in pictures of this
+    height [px]; `bend`: how far its paths leave the parabola through three positions, as a share of
+    half the acceleration. Where it uses neighbours, `reach`: frames to either side that it takes,
+    by default 1.
     """
 
     name: str

@@ -50,7 +50,7 @@ class Fusion:
 
     Strong: as cheap as taps; fast things keep a recognisable leading side. Artefacts: those
     of taps; a ghost of the sharp picture on leading faces, with an edge where facing changes;
-    with the printed weights hardly any blur, and what moves shines.
+    with the printed weights hardly any blur, and moving objects shine.
     """
 
     name = "fusion"

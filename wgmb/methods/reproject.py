@@ -29,13 +29,13 @@ class Reproject:
 
     Taylor's "Fast Motion Blur through Sample Reprojection" with the extensions the paper suggests:
     a depth test in every time slice, moving objects, the GPU. `samples` are time slices.
-    Samples come from the frame itself; what they leave open is filled from the neighbouring
+    Samples come from the frame itself; holes between them are filled from the neighbouring
     frames, where there are any. Integer atomics alone decide what is seen: the same bits every run.
     `variant`: "published" is the paper's: the previous frame's samples go towards this frame's
     camera and back in `samples` steps, are rounded to pixels and counted without a depth test,
     so the exposure is the interval between the two whatever the shutter. Cameras are
     interpolated; where there are vectors, samples follow those. Colour is summed in fixed
-    point of 64 bits: 0 to 262143 in steps of 1/16384, what is beyond is held to that range, and
+    point of 64 bits: 0 to 262143 in steps of 1/16384, other values are clamped to that range, and
     60,000 samples on one pixel in a few steps do not overflow; more are not all counted.
     Refinements named in the paper are optional there. `facing`: a sample whose surface faces
     away from the interpolated camera is dropped; needs cameras; the surface is that of the

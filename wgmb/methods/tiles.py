@@ -28,7 +28,7 @@ class Tiles:
     Blur Filter" (2014): tile maximum, neighbour maximum, and three weights per tap by motion and
     depth (after McGuire et al. 2012). Times are the shutter's, so that any curve and phase
     holds; a streak reaches at most a tile to either side: 40 px, or a ninth of the height.
-    `variant`: "even" divides every weight by what it is under uniform motion, so that there a
+    `variant`: "even" divides every weight by its value under uniform motion, so that there a
     streak is as even as the exposure; "published" takes them as printed, which makes streaks
     brightest in their middle. Without depth, everything is equally near. `show`: "tiles" gives
     the motion that each tile follows: hue is its direction, full brightness a whole tile.

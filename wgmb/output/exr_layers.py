@@ -22,8 +22,8 @@ def with_results(
 ) -> exr.Exr:
     """The source's file with its pictures replaced, confidence and the record's text added.
 
-    `view`: without what belongs to other views. `only_picture`: without all other layers, and
-    without what describes Cryptomattes. `grows`: parts with a picture have a data window that
+    `view`: without layers of other views. `only_picture`: without all other layers, and
+    without the description of Cryptomattes. `grows`: parts with a picture have a data window that
     holds it.
     """
     source = results[0].source

@@ -16,8 +16,8 @@ _NOT_OURS = " and holds no record of a run: it is cut off, or of another program
 def is_finished(path: Path, made_of: dict[str, Any], *, resume: bool, overwrite: bool) -> bool:
     """Return True, with `resume`, if there is a whole video that was made of the same.
 
-    False where a video is to be made. InputError where one is there that is not to be replaced:
-    without `overwrite`, `resume` replaces only what was made of the same and was damaged since.
+    False where a video is to be made. InputError for one that must not be replaced:
+    without `overwrite`, `resume` replaces only results of the same inputs that were damaged since.
     """
     if not os.path.exists(os.path.realpath(path)):
         return False

@@ -131,7 +131,7 @@ class Output:
     def is_finished(self, frames: Iterable[tuple[int, dict[str, Any]]]) -> bool:
         """Return True if this is a video that an earlier run made of the same (finished_videos.py).
 
-        `frames`: the numbers of all frames, and what each is made of (see Clip.made_of), which its
+        `frames`: the numbers of all frames, and the inputs of each (see Clip.made_of), which its
         record then has. To be asked before the first frame is written. InputError where a video is
         there that is not to be replaced.
         """

@@ -17,7 +17,7 @@ from .output import Output
 from .result import Result
 
 PROGRAMS = ("nuke", "rsmb", "blender", "plain", "flo")
-"""Whose vectors can be written; CONVENTIONS in vectors.py has what the numbers mean."""
+"""Whose vectors can be written; CONVENTIONS in vectors.py has the meaning of the numbers."""
 MAX_DISPLACE = 2048.0
 """The motion [px] that rsmb's 0 and 1 stand for, unless another is given."""
 _DEEP = (".png", ".tif", ".tiff")  # hold 16 bits
@@ -50,8 +50,8 @@ class VectorOutput(Output):
     """Files of motion vectors in a program's form; `written` makes the numbers.
 
     `program`: one of PROGRAMS. EXR files are 32-bit floats and have the windows of the input;
-    rsmb's may be PNG or TIFF of 16 bits too, which cover the display window, and say in their
-    records what `max_displace` is. A .flo covers it too, and has no record: it cannot be resumed.
+    rsmb's may be PNG or TIFF of 16 bits too, which cover the display window, and have
+    `max_displace` in their records. A .flo covers it too, and has no record: it cannot be resumed.
     Alpha of rsmb's is 1 where the vectors are valid. `max_displace`: of rsmb's [px]. `mask_of`: the
     channel of a frame that is 1 where its vectors are valid (Clip.vector_mask). `clipped` has the
     number of pixels that rsmb's form clipped, by frame. The others are as for Output.
@@ -151,7 +151,7 @@ def _file(
 
 
 def _in_display(source: FrameFile, channels: dict[str, np.ndarray]) -> np.ndarray:
-    """RGBA in the display window; what lies around the data does not move, and is not valid."""
+    """RGBA in the display window; pixels around the data do not move, and are not valid."""
     planes = [
         laid(channels[c], source.data_window, source.display_window, empty=empty)
         for c, empty in zip("RGBA", (0.5, 0.5, 0.0, 0.0), strict=True)

@@ -19,7 +19,7 @@ from .blur import Blur
 
 _AT_ONCE = 2  # pictures that are summed in one pass
 Part = tuple[Cell, FrameInShot | Frame, Blur]
-"""A cell, its frame as textures or as arrays, which are uploaded, and what blurs it."""
+"""A cell, its frame as textures or as arrays, which are uploaded, and its blur."""
 
 
 class ExposureSum:

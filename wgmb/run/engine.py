@@ -2,7 +2,7 @@
 
     input.read  ->  input.blur  ->  sink.put
 
-`run` puts what is made into a sink; with `frames`, the caller takes the sink's place. A thread
+`run` puts results into a sink; with `frames`, the caller takes the sink's place. A thread
 begins its next frame when the one before was taken from it, so that three frames at most are in
 memory, each with all its views.
 """
@@ -27,7 +27,7 @@ _END: Any = object()  # what follows the last item
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The course of a run, whatever it makes: what it skips, whom it tells, and when it ends."""
+    """The course of a run, whatever it makes: skipped frames, progress, errors and the end."""
 
     resume: bool = False
     """Frames that the sink has are skipped."""
@@ -44,7 +44,7 @@ class RunOptions:
 
 
 IsDone = Callable[[int, dict[str, Any]], bool]
-"""Called with a frame's number and what it depends on: True if the sink has it already."""
+"""Called with a frame's number and its dependencies: True if the sink has it already."""
 
 
 class Blurred(Protocol):
@@ -67,8 +67,8 @@ class Input(Protocol[_Read, _BlurredOut]):
     """Frames to be made."""
 
     ahead: int
-    """Number of them that are made ahead of each thread: 1 takes the least memory, more even out
-    what takes longer from time to time; 0 reads on the thread that blurs, and `frames` blurs on
+    """Number of them that are made ahead of each thread: 1 takes the least memory, more smooth out
+    occasional slow frames; 0 reads on the thread that blurs, and `frames` blurs on
     the caller's."""
 
     @property

@@ -1,4 +1,4 @@
-"""A run over rendered frames, settled: its settings, and what the whole sequence says of a frame.
+"""A fully resolved run over rendered frames: its settings, and findings about the whole sequence.
 
 `settle` looks at the sequence once. Any of the frames can then be blurred by any process, in a run
 of its own, and have the bytes that one run over all of them gives.
@@ -152,7 +152,7 @@ class Job:
         return self.request.output.resume or self.is_part_of_run
 
     def make_output(self, part: Clip | None = None) -> Output:
-        """The files of all frames, or of a `part` of them; see there what is refused."""
+        """The files of all frames, or of a `part` of them; see there for errors."""
         clip, shown = self._opened
         output = replace(self.request.output, resume=self._resumes)
         conversion = self.request.conversion
@@ -168,7 +168,7 @@ class Job:
         return output.make(self.settings, numbers, inputs, clip.chosen, shown, self.since)
 
     def sweep(self) -> None:
-        """Remove what dead processes of this host left of the job's own files; see atomic.sweep."""
+        """Remove the job's unfinished files of dead processes of this host; see atomic.sweep."""
         pattern = self.request.output.output
         for view in self.clip.chosen if has_view(pattern) else (None,):
             of_view = in_view(pattern, view)

@@ -38,7 +38,7 @@ _AGAIN = "write the job again"
 
 @dataclass(frozen=True)
 class Stored:
-    """A job as a file has it: what it was made of is known by size and time of change."""
+    """A job as a file has it: its inputs are identified by size and time of change."""
 
     job: Job
     chunk: int
@@ -168,7 +168,7 @@ def _stored_of(content: dict[str, Any]) -> Stored:
 
 
 def findings_of(plain: dict[str, Any]) -> SequenceFindings:
-    """From what `SequenceFindings.plain` returned."""
+    """The inverse of `SequenceFindings.plain`."""
     return restored(SequenceFindings, plain | {"on_disk": numbers(plain["on_disk"])})
 
 

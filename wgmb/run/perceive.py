@@ -40,7 +40,7 @@ class PresentedFrame:
 
 
 class PerceivedFrames:
-    """After each frame, what an observer sees of it."""
+    """After each frame, the image that an observer perceives."""
 
     ahead = 1
 
@@ -114,7 +114,7 @@ class PerceptionRun:
     output: Output
 
     def __call__(self, progress: Progress | None = None) -> BatchReport:
-        """Write what is seen of each frame; the first error ends it."""
+        """Write the perceived image of each frame; the first error ends it."""
         return run(self.frames, FileSink(self.output), RunOptions(progress=progress))
 
 

@@ -33,7 +33,7 @@ from .video_sink import Form
 
 @dataclass(frozen=True)
 class PerceivedVideo:
-    """A video that is looked at; after each picture, what is seen of it. Call it to write it."""
+    """A video that is looked at; after each picture, the perceived one. Call it to write it."""
 
     reader: VideoReader
     clock: Clock

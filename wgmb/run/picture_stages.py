@@ -170,7 +170,7 @@ class PictureStages(Stages):
 
     @property
     def messages(self) -> list[str]:
-        """Lines about what was held out, of each view."""
+        """Lines about the holdouts of each view."""
         told = (exposures.holdout.message for exposures, *_ in self._views.values())
         return list(dict.fromkeys(filter(None, told)))
 

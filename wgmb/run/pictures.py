@@ -80,8 +80,8 @@ class SteadyFrames:
     """Output frames of pictures at a steady rate, as the input of a run.
 
     `pictures`: with their numbers. They are read on the thread that blurs: a caller's iterator is
-    the caller's, and a thread that waits for a pipe cannot be interrupted. `form`: makes of an
-    exposure what is wanted.
+    the caller's, and a thread that waits for a pipe cannot be interrupted. `form`: converts an
+    exposure to the caller's form.
     """
 
     ahead, total = 0, 0

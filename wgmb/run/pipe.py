@@ -1,4 +1,4 @@
-"""Videos through pipes, at one end or at both; nothing is known of the end of what comes."""
+"""Videos through pipes, at one end or at both; the length of the input is unknown."""
 
 from __future__ import annotations
 
@@ -72,13 +72,13 @@ class _Source:
     """Pictures of another size, in words."""
 
     def format(self, encoding: Encoding, base: Fraction) -> tuple[VideoFormat, list[str]]:
-        """The form in which the output is written; and what is lost, in words."""
+        """The form in which the output is written; and its losses, in words."""
         coding, lost = encoding.coding(self.coding)
         return VideoFormat(encoding, coding, self.size, self.rate, base, self.facts), lost
 
 
 class _Writer(PictureWriter, Protocol):
-    """Writer of the output: how its pictures are coded, and what it cannot hold."""
+    """Writer of the output: how its pictures are coded, and its losses."""
 
     coding: Coding
     left_out: list[str]
@@ -177,7 +177,7 @@ def reader_of(
     request: VideoRequest,
     hints: StreamHints = StreamHints(),
 ) -> Reader:
-    """The reader for what comes through a buffered stream; see blur_pipe."""
+    """The reader for a buffered input stream; see blur_pipe."""
     most = request.input.max_mb
     beginning = stream.peek(len(_Y4M))[: len(_Y4M)]  # pyright: ignore[reportAttributeAccessIssue]
     if not beginning:

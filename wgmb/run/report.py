@@ -31,7 +31,7 @@ MOST_ROWS = 20  # of a report in a notebook, of a kind
 
 @dataclass
 class BatchReport:
-    """Result of a run over frames, and what was seen in them; plain values."""
+    """Result of a run over frames, with observations about them; plain values."""
 
     done: list[int] = field(default_factory=list)
     """Numbers of the frames that were written, in the order in which they were finished."""

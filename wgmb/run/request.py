@@ -74,7 +74,7 @@ class BlurRequest(SettingsGroups):
 
 
 def check_needs(clip: Clip, method: str) -> None:
-    """InputError where the first, the middle and the last frame lack what the method needs.
+    """InputError where the first, middle and last frame lack layers that the method needs.
 
     A frame that alone lacks it, or cannot be read, fails in its turn.
     """

@@ -81,7 +81,7 @@ def _check_names_of_views(clip: Clip, output: Output) -> None:
 
 
 def _run(output: Output, stages: Stages, options: RunOptions) -> BatchReport:
-    """All frames into an output, and what was seen in them."""
+    """All frames into an output, with observations about them."""
     report = run_into(output, stages, stages.numbers, options, stages.made_of)
     describe_input(report, stages.clip)
     is_converted = isinstance(stages, RateConversionStages)

@@ -132,7 +132,7 @@ class Stages:
         return Result(source, self._finished(picture), confidence, placement)
 
     def _finished(self, light: np.ndarray) -> np.ndarray:
-        """The light of a frame as it is written: what was expanded is compressed."""
+        """The light of a frame as it is written: expanded light is compressed again."""
         return self.clip.expansion.compressed(light)
 
 

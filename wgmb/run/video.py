@@ -1,4 +1,4 @@
-"""Videos from file to file: a request, what it opens once, and the run of each video."""
+"""Videos from file to file: a request, its shared resources, and the run of each video."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class VideoPlan:
 
     @property
     def losses(self) -> list[str]:
-        """Lines about what pictures lose in the output; they are in the report, too."""
+        """Lines about losses of the pictures in the output; they are in the report, too."""
         return losses(self.reader, self.output, self.video)
 
     @property
@@ -85,7 +85,7 @@ class VideoRequest(SettingsGroups):
     """
 
     def open(self, device: wgpu.GPUDevice | str | None = None) -> VideoRun:
-        """Open the GPU and what all videos share; InputError for settings that do not fit."""
+        """Open the GPU and all shared resources; InputError for settings that do not fit."""
         if self.blur.method is not None:
             check_method(self.blur.method, of_frames=True)
         check_fits(self.input, self.blur)
@@ -110,7 +110,7 @@ class VideoRequest(SettingsGroups):
 
 @dataclass(frozen=True)
 class VideoRun:
-    """A request with what is opened once for all its videos."""
+    """A request with the resources that all its videos share."""
 
     request: VideoRequest
     blur: Blur
@@ -127,7 +127,7 @@ class VideoRun:
 
     @property
     def advice(self) -> str:
-        """A line on what would find the motion sooner, or better, if that was left open."""
+        """A line on quicker or better sources of motion, if none was set."""
         is_slow = self.blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         if self.request.video.flow != "auto" or not is_slow:
             return ""
@@ -146,7 +146,7 @@ class VideoRun:
         elif (flow.flow == "search" and is_installed("cv2")) or (
             flow.flow == "dis" and self.at_edges is not None
         ):
-            found = "`flow=dis` takes less, but loses what is fast"
+            found = "`flow=dis` takes less, but loses fast motion"
         elif flow.flow == "dis" and (flow.flow_quality, method) != ("fast", "tap"):
             by = "`flow_quality=fast`" if flow.flow_quality == "best" else "`method=tap`"
             found = f"{by} takes less"
@@ -224,7 +224,7 @@ class VideoRun:
         return self.described(report, exposures)
 
     def described(self, report: VideoReport, exposures: Exposures) -> VideoReport:
-        """The report with what its exposures tell."""
+        """The report with the findings of its exposures."""
         shots = exposures.shots
         return replace(
             report,

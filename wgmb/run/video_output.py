@@ -66,7 +66,7 @@ def sounds_kept(reader: VideoReader, output: OutputSettings, video: VideoSetting
 
 
 def losses(reader: VideoReader, output: OutputSettings, video: VideoSettings) -> list[str]:
-    """Lines about what pictures lose in the output, as far as it is known before the run."""
+    """Lines about losses of the pictures in the output, as far as they are known before the run."""
     path = Path(output.output)
     if path.suffix.lower() not in SUFFIXES:
         return []
@@ -79,8 +79,8 @@ def losses(reader: VideoReader, output: OutputSettings, video: VideoSettings) ->
 def check_output(output: OutputSettings, video: VideoSettings, source: str | Path) -> None:
     """InputError for an output that cannot be made of a video, before that is opened.
 
-    This is about what needs no look at the input: the kind of file, its codec, a rate that is set,
-    and an output that is the input.
+    This covers checks that need no look at the input: the kind of file, its codec, a rate that is
+    set, and an output that is the input.
     """
     if is_pipe(output.output):
         return
@@ -104,7 +104,7 @@ def write(
     masks: Sequence[Path] = (),
     progress: Progress | None = None,
 ) -> list[str]:
-    """Write the wanted frames; returns what the output cannot hold, in lines.
+    """Write the selected frames; returns the losses of the output, in lines.
 
     `masks`: further files that are read, which are never written.
     """
@@ -123,7 +123,7 @@ def _write_video(
     inputs: Sequence[Path],
     progress: Progress | None,
 ) -> list[str]:
-    """Write a video, with `resume` in segments; returns what it cannot hold, in lines."""
+    """Write a video, with `resume` in segments; returns its losses, in lines."""
     path, reader = Path(output.output), source.reader
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(reader.coding)

@@ -72,7 +72,7 @@ class VideoSink:
 
 
 Form = Callable[[OutputFrame, ExposedPicture], Blurred]
-"""Makes of an exposure what a sink takes; it runs on the thread of the GPU."""
+"""Converts an exposure for a sink; it runs on the thread of the GPU."""
 
 
 def coded_form(coding: Coding) -> Form:

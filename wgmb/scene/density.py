@@ -1,6 +1,6 @@
 """Occupancy: the share of an exposure in which a rotating body is at a place.
 
-What wgsl/scene/density.wgsl takes: rotations, and tables of the shutter's integral.
+Inputs of wgsl/scene/density.wgsl: rotations, and tables of the shutter's integral.
 """
 
 from __future__ import annotations

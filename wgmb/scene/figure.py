@@ -1,6 +1,6 @@
 """The article's figures (P. Cusa, "Motion Blur All the Way Down", 2022).
 
-Flat pictures in display values: an orbiting disk, what a cone cell makes of it, a torus in section.
+Flat pictures in display values: an orbiting disk, the response of a cone cell, a torus in section.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Figure:
             raise InputError(f"speed must be 0 to {FASTEST:g} rad/s, got {self.speed}")
 
     def fill(self, row: np.ndarray, time: float) -> None:
-        """Write what is seen at `time` [s] into a `Figure` of wgsl/figure.wgsl."""
+        """Write the picture at `time` [s] into a `Figure` of wgsl/figure.wgsl."""
         cone, time = Cone(), self.begin + time
         row["small"], row["large"], row["slice"] = self.small, self.large, self.slice
         # Standing still is perceived as the slowest motion is.

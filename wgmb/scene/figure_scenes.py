@@ -19,7 +19,7 @@ def disk(speed: float = 20.0, rotation: float = 1.0) -> Scene:
 
 
 def cone(video: str = "natural", time: float = 0.0, speed: float = 15.0) -> Scene:
-    """Figures 2 and 3: the disk beside what a cone cell makes of it, `time` [s] later.
+    """Figures 2 and 3: the disk beside the response of a cone cell, `time` [s] later.
 
     `video`: "natural", or how frames are blurred: none, box, trapezoid, cosine, at 60 a second.
     """

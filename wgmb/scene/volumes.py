@@ -134,7 +134,7 @@ class Backdrop:
     Colours are display values, as in the animation that this is from (Cusa 2022, torusphere).
     `grids`: side of the cells and brightness of each. `strobe`: phase [rad] and amount of a
     flicker. `bound`: radius of the sphere around the origin that is searched for volumes, a
-    twentieth of it a step; None: what holds them all. `grain`: another number is other noise.
+    twentieth of it a step; None: one that holds them all. `grain`: another number is other noise.
     """
 
     tint: Color = (0.33, 0.18, 0.10)

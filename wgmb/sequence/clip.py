@@ -36,7 +36,7 @@ _SHOWN = 5  # sequences of a folder that are named
 
 
 def _check_kind(pattern: str | Path) -> None:
-    """InputError for what is no frames: a video, or a folder, whose sequences are named."""
+    """InputError for a video, or a folder, whose sequences are named."""
     path = Path(pattern)
     if path.is_dir():
         kinds = ".exr", *STILLS
@@ -58,8 +58,8 @@ class Clip:
     sizes, `notes` messages for the user, each with its frames, and `absent` the masks by index or
     id (`IndexOB=4`, `CryptoObject=0x...`) that none of them has.
 
-    Its parts, for what it has no method for: `cache` (files), `builder` (layers), `masks`, and
-    `dependencies` (the files that a result depends on).
+    Its parts, for needs without a method of their own: `cache` (files), `builder` (layers),
+    `masks`, and `dependencies` (the files that a result depends on).
 
     Stereo frames have `views`. Each view has its own picture, vectors, depth and masks; cuts and
     the vector convention are determined from the default view.

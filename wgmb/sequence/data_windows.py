@@ -2,8 +2,8 @@
 
 A renderer or compositor may store only the part of a frame that holds something: the data window.
 Where it ends within the display window, nothing lies beyond: transparent, infinitely far, still.
-Where it ends with the display window, or cuts through the picture, what lies beyond is unknown,
-and the pixels at its edge stand for it. Overscan beyond the display window counts as picture.
+Where it ends with the display window, or cuts through the picture, the rest is unknown, and the
+pixels at its edge are repeated. Overscan beyond the display window counts as picture.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ def _sides(by: list[int], dimensions: int) -> list[tuple[int, int]]:
 
 
 def result_window(picture: np.ndarray, placement: Placement, own: Window) -> Window:
-    """The window of a result that fills the canvas: the frame's own, and what is not empty."""
+    """The window of a result that fills the canvas: the frame's own, and all visible pixels."""
     filled = (picture != 0).any(axis=2)
     rows, columns = (np.flatnonzero(filled.any(axis=axis)) for axis in (1, 0))
     if not len(rows):

@@ -53,7 +53,7 @@ class FrameBuilder:
         return self._finder.finding
 
     def build(self, source: FrameFile, wanted: frozenset[str]) -> Frame:
-        """The Frame of `source` as its layers have it; of OPTIONAL, only what is `wanted`.
+        """The Frame of `source` as its layers have it; of OPTIONAL, only the fields in `wanted`.
 
         Without "color", its colour is 0.
         """
@@ -117,7 +117,7 @@ class FrameBuilder:
         return standing(source)
 
     def _color(self, source: FrameFile) -> np.ndarray:
-        """The picture, premultiplied; what its alpha seems to mean otherwise is noted."""
+        """The picture, premultiplied; alpha that seems to mean something else is noted."""
         rgba, notes = source.rgba, self._stored.notes
         if rgba.shape[2] == 3:
             return rgba
@@ -180,7 +180,7 @@ class FrameBuilder:
         return made
 
     def _light(self, source: FrameFile) -> dict[str, Any]:
-        """Fields of Frame; what is there in vain is noted."""
+        """Fields of Frame; layers that are not used are noted."""
         found, notes = self.light_passes(source), self._stored.notes
         if found.lacking and source.number not in (on := notes.setdefault(found.lacking, [])):
             on.append(source.number)

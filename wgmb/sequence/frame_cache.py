@@ -92,7 +92,7 @@ class FrameCache:
         return found[view]
 
     def leader(self, number: int) -> FrameFile:
-        """The view on which is settled what all views of a frame share: the default one."""
+        """The view that decides for all views of a frame: the default one."""
         found = self.all(number)
         return next((s for s in found if s.reference_channel is not None), found[0])
 
@@ -115,7 +115,7 @@ class FrameCache:
         return [s for s in found if s.reference_channel is not None] or [found[0]]
 
     def own(self, source: FrameFile) -> dict[str, np.ndarray]:
-        """The channels of a view. What is in no view belongs to the default one."""
+        """The channels of a view. Layers of no view belong to the default one."""
         if source.view is None or not self.views or source.view == self.views[0]:
             return source.channels
         return {k: plane for k, plane in source.channels.items() if k not in source.shared}

@@ -258,7 +258,7 @@ class _Content:
         return tuple(view for view in self.views if view is not None)
 
     def chosen(self, view: str | None, default: str | None, whole: bool) -> list[str | None]:
-        """Keys in `views` of what belongs to a frame's `view`; `whole`: all of the file does."""
+        """Keys in `views` of the layers of a frame's `view`; `whole`: those of all the file."""
         if whole and len(self.named) > 1:
             raise InputError(
                 f"{self.path}: has the views {', '.join(self.named)}; write its name without %V"
@@ -314,7 +314,7 @@ def _together(
     wanted: str | None,
     view: str | None,
 ) -> FrameFile:
-    """One view of a frame: of each of its files what is under the given keys."""
+    """One view of a frame: the layers of each of its files under the given keys."""
     main = contents[0][0]
     channels: dict[str, np.ndarray] = {}
     attributes: dict[str, Any] = {}

@@ -48,7 +48,7 @@ def space_of(frame: FrameFile, config: ColorConfig) -> ColorSpace:
 
 
 def without_pixels(frame: FrameFile) -> FrameFile:
-    """The frame with nothing but what `space_of` asks."""
+    """The frame with only the fields that `space_of` needs."""
     part = frame.part and replace(frame.part, channels={})
     return replace(frame, file=None, channels={}, part=part, origin={})
 

@@ -66,13 +66,13 @@ class Neighbours:
         self._panoramas: set[tuple[int, str | None]] = set()
 
     def forget(self, number: int) -> None:
-        """Drop what was made of a frame."""
+        """Drop all data made of a frame."""
         for kept in (self._alone, self._placed):
             for key in [key for key in kept if key[0] == number]:
                 del kept[key]
 
     def forget_all(self) -> None:
-        """Drop what was made of every frame."""
+        """Drop all data made of every frame."""
         self._alone.clear()
         self._placed.clear()
 
@@ -187,7 +187,7 @@ class Neighbours:
         return result
 
     def _laid(self, onto: Window, source: FrameFile, frame: Frame, wraps: bool) -> Frame:
-        """`frame` on a canvas; `wraps`: what lies beyond its sides is read around them."""
+        """`frame` on a canvas; `wraps`: pixels beyond its sides are read around them."""
         if wraps:
             return panorama.placed(frame, source.data_window, onto)
         return placed(frame, source.data_window, onto, self._edges(source, onto))
@@ -280,7 +280,7 @@ class Neighbours:
             raise InputError(f"{source.path}: {error}") from None
 
     def _edges(self, source: FrameFile, onto: Window) -> Sides:
-        """The sides of a frame beyond which its edge stands for what is unknown there."""
+        """The sides of a frame beyond which its edge is repeated: the picture is unknown there."""
         if onto == source.data_window:
             return False, False, False, False
         return unknown(source.data_window, source.display_window, self._cut_through)

@@ -1,7 +1,7 @@
 """Panoramas of 360 degrees: equirectangular frames, whose left and right edge are one meridian.
 
 A renderer writes the motion of a body that crosses this edge as nearly the width. Here it is the
-short way, and a blur reads beyond one edge what lies inside the other. The poles stay edges.
+short way, and a blur reads beyond one edge the pixels inside the other. The poles stay edges.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def canvas(display: Window, boxes: list[Box]) -> Window:
 
 
 def placed(frame: Frame, window: Window, onto: Window) -> Frame:
-    """`frame`, which fills `window`, on the wider canvas `onto`: what lies beyond an edge is read
-    around the other one."""
+    """`frame`, which fills `window`, on the wider canvas `onto`: pixels beyond an edge are
+    read around the other one."""
     if window == onto:
         return frame
     if frame.camera is not None:

@@ -84,7 +84,7 @@ class BlurSettings:
     "Maximum blur length in pixels."
 
     def resolved(self, scene: Scene | None = None, has: Collection[str] | None = None) -> Self:
-        """Return a copy; an unset method is chosen by the scene, or by what frames have."""
+        """Return a copy; an unset method is chosen by the scene, or by the layers of the frames."""
         suited = "gather" if has is None else default_method(has)
         if scene is not None and scene.has_volumes:
             suited = "volume"
@@ -92,7 +92,7 @@ class BlurSettings:
 
     def for_pictures(self) -> Self:
         """Return a copy for motion found in pictures, after `resolved`: unset samples are auto, and
-        unset shading is off, as what seems to rest there may move.
+        unset shading is off, as areas that seem static there may move.
         """
         method = METHODS.get(self.method or "")
         unset: dict[str, Any] = {}
@@ -133,7 +133,7 @@ class BlurSettings:
         """The settings on which a result depends, for its record.
 
         Options that only methods of other packages have are in it where they are set, so that it
-        does not depend on what is installed; with such a method, its package and version too.
+        does not depend on installed packages; with such a method, its package and version too.
         """
         unset = {name for name in _OF_OTHERS if getattr(self, name) == METHOD_OPTIONS[name][1]}
         found = {name: value for name, value in plain(self).items() if name not in unset}
@@ -144,7 +144,7 @@ class BlurSettings:
     def settled_samples(self) -> int | str:
         """The samples of the Blur, for a record: a number, or "auto".
 
-        InputError as from `make`, but for what depends on the device; none is opened.
+        InputError as from `make`, except for limits of the device; none is opened.
         """
         method, options = method_of(self.method or ""), self._method_options()
         samples, auto = checked(method, self.samples, self.jitter, self.max_blur, options=options)

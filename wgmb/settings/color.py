@@ -1,4 +1,4 @@
-"""Settings of colours: what the input's numbers mean, and how results are shown to people."""
+"""Settings of colours: the meaning of the input's numbers, and the display of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The settings in the record of a result, which tells later runs what it was made of."""
+"""The settings in the record of a result, by which later runs compare it."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class VideoSettings(FlowSettings):
     end: str | None = None
     "Time in the video to end at."
     longest_pause: float = 600.0
-    "Longest time from one picture to the next in seconds; what is longer is refused."
+    "Longest time from one picture to the next in seconds; longer ones are refused."
     speed: str = "1"
     "Speed of the output, such as 0.5 for slow motion."
     pitch: Literal["keep", "follow"] = "keep"

@@ -1,7 +1,7 @@
 """Pictures of a steady rate that a faster file repeats in turn, such as film of 24 in a file of 30.
 
 Each is shown from the next place on that the file has, so that they come at uneven times, though
-what they show moves evenly. They get their own times again, evenly around those of the file.
+the motion in them is even. They get their own times again, evenly around those of the file.
 """
 
 from __future__ import annotations

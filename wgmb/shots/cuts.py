@@ -84,7 +84,7 @@ def smalls_differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Return True if a cut lies between two pictures, of which these are small copies.
 
     Copies are display values (height, width, 3); see small_step. Blocks of one are looked
-    for in the other within a fifth of the width. Measured: what is left is 0.55 to 0.63 of the
+    for in the other within a fifth of the width. Measured: the residual is 0.55 to 0.63 of the
     blocks' own contrast where all moves, by up to 118 of 640 px, and 0.97 to 1.48 between unrelated
     pictures. A fade is no cut: its pictures are compared at equal brightness and contrast, where
     0.2 to 0.45 is left, and 0.73 to 2.3 of unrelated pictures.

@@ -54,7 +54,7 @@ def _best_ways(a: np.ndarray, b: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:
-    """(rows, BLOCK, columns, BLOCK) of a plane, without what is beyond its last whole blocks."""
+    """(rows, BLOCK, columns, BLOCK) of a plane, without pixels beyond its last whole blocks."""
     rows, columns = (n // BLOCK for n in plane.shape)
     whole = plane[: rows * BLOCK, : columns * BLOCK].astype(np.float32)
     return whole.reshape(rows, BLOCK, columns, BLOCK)

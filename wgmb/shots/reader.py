@@ -107,7 +107,7 @@ class ShotReader(Generic[T]):
     def cells(self, at: float, interval: float, shutter: Shutter) -> list[Cell]:
         """The cells of an output frame (see exposure.py); their indices are the reader's.
 
-        Asked for in the order of time, as what lies before is forgotten.
+        Requests must be in the order of time, as earlier pictures are forgotten.
         """
         self.read_beyond(at + interval * max(shutter.span[1], 0.0))
         here = self._index_at(at)

@@ -1,9 +1,9 @@
 """Repeated pictures: those that show the one before again, but for the noise of a codec.
 
-A codec spends its bits on what changes, so that its noise is a small share of what it coded: where
-a picture differs from the one before by less than a twentieth of the energy of the motion before
-and after it, it stands still while all else moves. What is this small before and after too, such
-as a small pointer that moves alone, is motion.
+A codec spends its bits on changes, so that its noise is a small share of them: where a picture
+differs from the one before by less than a twentieth of the energy of the motion before and after
+it, it repeats that picture while all else moves. A change that is as small before and after too,
+such as a small pointer that moves alone, is motion.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ class LightChanges:
 
 
 class ChangingLight:
-    """Adds what light changes to exposures of the pictures of a video, on a device.
+    """Adds changes of light to exposures of the pictures of a video, on a device.
 
     A moment between two pictures has light of both, by its distance in time. A blur takes the light
     of a picture itself; this adds the rest where the same is seen along the motion, in a light that

@@ -1,4 +1,4 @@
-"""One clock for all streams of a video: when what was at an input time is in the output."""
+"""One clock for all streams of a video: it maps input times to output times."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class Displays:
         self._steps: dict[int, np.ndarray] = {}
 
     def mask(self, number: int) -> np.ndarray | None:
-        """(height, width) bool, what stands; None if there is no display.
+        """(height, width) bool, True at a display; None if there is no display.
 
         It depends on the REACH pictures before and after alone.
         """
@@ -150,7 +150,7 @@ def _contrast(grey: np.ndarray) -> np.ndarray:
 
 
 def _neighbourhood(plane: np.ndarray, reach: tuple[int, int], choose: np.ufunc) -> np.ndarray:
-    """The sum, greatest or least up to `reach` rows and columns to each side, of what is there."""
+    """The sum, greatest or least up to `reach` rows and columns to each side."""
     for axis in (0, 1):
         whole = np.moveaxis(plane, axis, 0)
         total = whole.copy(order="K")

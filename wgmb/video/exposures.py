@@ -38,7 +38,7 @@ class Exposures:
     """The exposures of pictures in time, one after the other, wherever the pictures come from.
 
     `motion`: where motion comes from (wgmb/flow); None: pictures are averaged as they are.
-    `holdout`: what stays sharp. `fill`: repeated pictures are left out, and motion
+    `holdout`: areas that stay sharp. `fill`: repeated pictures are left out, and motion
     goes on over the gap. `at_edges`: blurs the pictures with edges of motion, if not `blur`.
     `cuts`: whether cuts are looked for, beside `known_cuts`, the numbers of pictures that begin a
     shot. `planes`: make their light, which may be expanded for the blur.
@@ -163,7 +163,7 @@ class Exposures:
         cells: Sequence[Cell],
         is_coded: bool = False,
     ) -> tuple[wgpu.GPUTexture, LightChanges | None]:
-        """The same as it is blurred: expanded, and what light changes in it is not added.
+        """The same as it is blurred: expanded, and without changes of light.
 
         `is_coded`: it will be, and pixels may not be finite.
         """
@@ -236,7 +236,7 @@ class VideoBlur(Exposures):
 
 @dataclass(frozen=True)
 class Exposure:
-    """An output frame, made when it is asked for as what is wanted."""
+    """An output frame, made on request in the requested form."""
 
     _run: Exposures
     _shots: Shots[Thumbnail]

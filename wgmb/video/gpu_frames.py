@@ -29,10 +29,10 @@ LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two 
 class VideoFrames:
     """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
-    `motion`: where motion comes from, or None. `holdout`: what stays sharp, where there is motion.
-    `planes`: make their light; motion is searched in light that is not expanded. `changing`: adds
-    what light changes, for all that blur pictures of `shots`. Numbers of pictures that are copied,
-    as none of their shot is beside them to find motion from, are `alone`.
+    `motion`: where motion comes from, or None. `holdout`: areas that stay sharp, where there is
+    motion. `planes`: make their light; motion is searched in light that is not expanded.
+    `changing`: adds changes of light, for all that blur pictures of `shots`. Numbers of pictures
+    that are copied, as none of their shot is beside them to find motion from, are `alone`.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class VideoFrames:
     def in_shot(self, index: int, blur: Blur | None = None) -> FrameInShot:
         """A picture, between its neighbours if the method takes them, of `blur` if not of its own.
 
-        What they refer to may be overwritten once two others have been asked for.
+        Their textures may be overwritten once two others have been requested.
         """
         wanted = [index]
         method = (blur or self._blur).method
@@ -72,7 +72,7 @@ class VideoFrames:
         return FrameInShot(views[index], before, after, self._shots[index].number)
 
     def change(self, cell: Cell, begins: bool) -> bool:
-        """Submit what the light changes in the part of an exposure that `cell` is.
+        """Submit the changes of light in the part `cell` of an exposure.
 
         `begins`: it is the first part that does. False where there is no motion.
         """
@@ -144,7 +144,7 @@ class VideoFrames:
         return texture
 
     def _held_out(self, index: int) -> View | None:
-        """Mask of what stays sharp in a picture."""
+        """Mask of the areas of a picture that stay sharp."""
         plane, texel = self._held(index), TEXTURES["holdout"]["format"]
         if plane is None:
             return None

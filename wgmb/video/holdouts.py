@@ -28,9 +28,9 @@ Held = Callable[[int], np.ndarray | None]
 class Holdout:
     """Pixels that stay sharp in the pictures of a video, besides those that do not move.
 
-    `mask` (height, width): in every picture, 1 stays sharp. `displays`: also what is found of
-    displays in each picture; `always`: however much it is, see Displays. `shares`: the share of
-    each picture that displays took, by its number.
+    `mask` (height, width): in every picture, 1 stays sharp. `displays`: also the
+    displays found in each picture; `always`: however large they are, see Displays. `shares`: the
+    share of each picture that displays took, by its number.
     """
 
     mask: np.ndarray | None = None

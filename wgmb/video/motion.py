@@ -25,7 +25,7 @@ class VideoMotion(ShotMotion):
     """The motion of pictures in time, by their indices, nowhere ragged.
 
     Flow and DenseInverseSearch take them as textures of `device`, in light that is not expanded,
-    others as grey. What is smooth, as dense inverse search is, is left as it is.
+    others as grey. Smooth motion, such as that of dense inverse search, is left as it is.
     """
 
     def __init__(

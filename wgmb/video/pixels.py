@@ -29,7 +29,7 @@ _UNREADABLE = re.compile(r"bayer_|xyz|.*f(16|32)(le|be)$")
 
 @dataclass(frozen=True)
 class PlaneLayout:
-    """A planar format, and what the format of a frame says about its samples."""
+    """A planar format, with the properties of its samples."""
 
     name: str
     """Of the planar format."""

@@ -14,7 +14,7 @@ _CHANGES = 0.25  # share of changes around a pixel from which it stands out by n
 
 
 def overlay_of(reader: VideoReader) -> np.ndarray:
-    """(height, width) float32: 1 where nothing changes although what is around it does.
+    """(height, width) float32: 1 where nothing changes although the surroundings do.
 
     Looked for in pictures from all over the video.
     """

@@ -27,7 +27,7 @@ _WHITE = {PQ: 0.58, HLG: 0.75}  # signal of the white of text and paper (ITU-R B
 
 
 class Thumbnail:
-    """A coded picture, and what is seen of it at a glance: each made once, when it is asked for."""
+    """A coded picture and its small versions; each is made once, on request."""
 
     def __init__(self, coded: CodedPicture):
         self.coded = coded

@@ -35,8 +35,8 @@ _PLAIN = re.compile(r"(420|422|444|440|411|mono)(jpeg|mpeg2|paldv|alpha|p?(?:9|1
 class Y4mReader:
     """Reads pictures from a stream that cannot be sought. `name`: of the stream, for messages.
 
-    `color`: a name in COLORS, or None for what players assume. InputError in one line for a stream
-    that holds none, or something else, and for pictures of more than `max_mb` megabytes.
+    `color`: a name in COLORS, or None for the assumption of players. InputError in one line for a
+    stream that holds none, or something else, and for pictures of more than `max_mb` megabytes.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Y4mReader:
         self.coding, self.notes = self._coding(full, color)
 
     def pictures(self) -> Iterator[tuple[int, CodedPicture]]:
-        """The pictures and their numbers, up to the end or to what is cut off (see `loss`)."""
+        """The pictures and their numbers, up to the end or a break in the stream (see `loss`)."""
         kind = np.dtype("<u2" if self.coding.bits > 8 else "u1")
         shapes = planes_of(self.size, self.coding)
         length, number = sum(h * w for h, w in shapes) * kind.itemsize, 0
@@ -176,8 +176,7 @@ def lost_in(size: tuple[int, int], coding: Coding, facts: Facts) -> list[str]:
     taken, _ = _assumed(held, size, None)
     if any(a != b for a, b in zip(_for_players(taken), _for_players(held), strict=True)):
         said.append(
-            "YUV4MPEG2 states no colours, and these are not what players assume; "
-            "`codec='ffv1'` states them"
+            "YUV4MPEG2 states no colours, and players assume others; `codec='ffv1'` states them"
         )
     if facts.mastering or facts.light_level:
         said.append("YUV4MPEG2 keeps no HDR10 data (mastering display, light level)")

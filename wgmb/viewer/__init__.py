@@ -1,12 +1,12 @@
 """The interactive viewer: `wgmb view`, `python app.py`.
 
-state/     what the viewer is set to: one frozen State; as TOML and as words of a command line
+state/     the viewer's settings: one frozen State; as TOML and as words of a command line
 subjects/  a scene, frames or a video, drawn into textures; motion and cuts of a video
 draw/      a State becomes one or two images, in small steps or in a thread, and these go on the
            screen
 panel/     the controls beside the image, and text over it
 window     events in, images out, on a desktop or offscreen; controls: an event and a State make
-           a State; actions: files, videos, exports; capabilities: what can be chosen
+           a State; actions: files, videos, exports; capabilities: the available choices
 """
 
 from .state.state import State

@@ -117,7 +117,7 @@ class Actions:
             self._video.add(self._displayed())
 
     def close(self) -> None:
-        """Let go of what is under way: a video is finished, an export goes on by itself."""
+        """End running work: a video is finished, an export goes on by itself."""
         if self._video is not None:
             video, self._video = self._video, None
             video.close()

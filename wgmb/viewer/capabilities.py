@@ -53,7 +53,7 @@ class Choices:
     def first_light(self, state: State) -> np.ndarray | None:
         """The picture alone of frames that are opened now, once; None of all else.
 
-        (height, width, 4), as the file has it. It need not wait for what their vectors mean.
+        (height, width, 4), as the file has it. It need not wait for the test of their vectors.
         """
         if state.is_scene or state.is_video or state.mode in BOTH_EYES:
             return None
@@ -82,7 +82,7 @@ class Choices:
                 clip.close()
 
     def close(self) -> None:
-        """End what goes on beside the window."""
+        """End all work beside the window."""
         self._close_but(())
 
     def methods(self, state: State) -> list[str]:
@@ -114,7 +114,7 @@ class Choices:
         return [look for look in LOOKS if can[look]] + (self.shows(state) if blurred else [])
 
     def eyes(self, state: State) -> list[str]:
-        """Return what can be shown of stereo frames: each view, and both eyes."""
+        """Return the choices for stereo frames: each view, and both eyes."""
         subject = self.subject(state)
         if isinstance(subject, ClipSubject) and len(subject.eyes) > 1:
             return [*subject.eyes, *BOTH_EYES]
@@ -127,9 +127,9 @@ class Choices:
         return subject.sides()
 
     def reference(self, state: State) -> str | None:
-        """The method that draws what the picture should be, if there is one.
+        """The method that draws the ground truth, if there is one.
 
-        Where it is looked at what is perceived, that is nature: a world without frames.
+        Where the perceived picture is shown, that is nature: a world without frames.
         """
         if state.eye:
             return self.subject(state).nature(state)

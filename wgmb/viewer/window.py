@@ -149,7 +149,7 @@ class Viewer:
         return guarded
 
     def _quit(self) -> None:
-        """Close the window, after what is being drawn: it is presented on the window."""
+        """Close the window, after the drawing in progress: it is presented on the window."""
         close = self.canvas.close
         close() if self._call_soon is None else self._call_soon(close)
 
@@ -159,7 +159,7 @@ class Viewer:
         return isinstance(self.stage, DrawThread)
 
     def close(self) -> None:
-        """End what goes on beside the window: a video is finished, an export goes on by itself."""
+        """End all work beside the window: a video is finished, an export goes on by itself."""
         self.actions.close()
         self.stage.close()
         self.screen.close()
@@ -334,7 +334,7 @@ class Viewer:
         self._passes |= report.seconds | report.passes | {"view": self.screen.seconds}
 
     def _prepare(self, state: State) -> None:
-        """Draw what goes on the screen; the state, as far as it is possible, is what is there."""
+        """Draw the screen; return the state that was shown, as far as it is possible."""
         full = self.actions.recording
         changes = state.picture != self._good.picture
         self._sliding = self.panel.active and (self._sliding or changes)
@@ -376,7 +376,7 @@ class Viewer:
         return self.state.mode == "flicker" and int(self._now / _FLICKER) % 2 == 1
 
     def _noted_gui(self) -> None:
-        """Draw the panel; what goes wrong is kept, which ImGui would hide behind its own error."""
+        """Draw the panel; an error is kept, which ImGui would hide behind its own."""
         try:
             self._gui()
         except Exception as error:
@@ -479,9 +479,9 @@ def view(
 ) -> None:
     """Open a window and return when it is closed; errors in it are raised.
 
-    Bounds what glibc's allocator keeps for itself in this process.
+    Bounds the memory that glibc's allocator keeps for itself in this process.
 
-    `interface`: size of the panel and its text, times what the system says.
+    `interface`: size of the panel and its text, times that of the system.
     """
     low, high = SIZES
     if not low <= interface <= high:

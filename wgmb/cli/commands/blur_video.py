@@ -74,7 +74,7 @@ def tell_how(run: VideoRun, console: Console) -> None:
 
 
 def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
-    """Blur a video, with lines about what was seen in it; the exit code."""
+    """Blur a video, with lines about its peculiarities; the exit code."""
     losses = plan.losses
     console.say(*(f"{plan.name}: {text}" for text in losses))
     with console.progress(len(plan.wanted)) as tick:
@@ -93,7 +93,7 @@ def _blur_alone(run: VideoRun, plan: VideoPlan, console: Console) -> int:
 
 
 def _estimated(tick: Tick, frames: int, run: VideoRun, console: Console) -> Progress:
-    """A progress that also says how long a long run takes, and what is quicker."""
+    """A progress with the estimated duration of a long run, and quicker settings."""
     words = f"{run.quicker}, and --try 5 shows some places first"
     return Estimate(tick, frames, words, console.say)
 
@@ -165,7 +165,7 @@ def _log_end(report: VideoReport) -> None:
 
 
 def _remarks(report: VideoReport, run: VideoRun) -> list[str]:
-    """Lines on what was seen in a video; some are empty."""
+    """Lines on the peculiarities of a video; some are empty."""
     fills = report.is_new and run.request.video.duplicates == "fill"
     repeats, alone = repeats_told(report.repeated) if fills else "", alone_told(report.alone)
     return [alone, repeats, report.held_out, report.scaling]

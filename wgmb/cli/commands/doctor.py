@@ -1,4 +1,4 @@
-"""`wgmb doctor`: what runs here, and whether it blurs, as text for a report of a fault."""
+"""`wgmb doctor`: versions, GPUs and a test of a blur, as text for a report of a fault."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ VARIABLES = (
     "CUDA_VISIBLE_DEVICES", "WGPU_BACKEND_TYPE", "WGPU_LIB_PATH", "LP_NUM_THREADS",
     "LD_LIBRARY_PATH", "PYTHONPATH", "DISPLAY", "WAYLAND_DISPLAY", "XDG_SESSION_TYPE",
 )  # fmt: skip
-"""Environment variables that change what wgmb does; others are not shown."""
+"""Environment variables that change wgmb's behaviour; others are not shown."""
 REMEDY = "no GPU can be used; a driver for Vulkan helps, on Debian and Ubuntu without a GPU too: "
 REMEDY += "apt-get install libvulkan1 mesa-vulkan-drivers"
 _PATIENCE = 60  # seconds for the imports of all extras, in processes of their own
@@ -85,7 +85,7 @@ def _environment() -> Iterator[str]:
 
 
 def _extras() -> Iterator[str]:
-    """A line for each extra: its packages, and what is wrong with them."""
+    """A line for each extra: its packages, and their faults."""
     packages: dict[str, list[str]] = {}
     for name, package in EXTRAS.items():
         packages.setdefault(package.extra, []).append(name)

@@ -62,7 +62,7 @@ def view(
     window
         Window size, WIDTHxHEIGHT.
     interface
-        Size of the panel and its text, 0.5 to 4, times what the system says.
+        Size of the panel and its text, 0.5 to 4, times that of the system.
     adapter
         GPU to use: a number or part of a name from `wgmb devices`.
     """

@@ -20,7 +20,7 @@ TAPS = (4, 8, 12, 16, 24, 32)
 
 
 def rosado(lab: Laboratory, report: Report, size: tuple[int, int]) -> None:
-    """Rosado's choices: what a tap costs, camera-only or velocity buffer, with and without mask.
+    """Rosado's choices: the cost of a tap, camera-only or velocity buffer, with and without mask.
 
     A car-like box drives before a camera that follows it, while a ball crosses. Camera-only
     motion blurs the box, which should stay sharp; the chapter masks it; a velocity buffer
@@ -48,7 +48,7 @@ def rosado(lab: Laboratory, report: Report, size: tuple[int, int]) -> None:
         curves[c.label] = points
     columns = ["motion", "a tap [ms]", "without taps [ms]", "FLIP", "PSNR"]
     note = f"{size[0]} x {size[1]}; a straight line through {min(TAPS)} to {max(TAPS)} taps."
-    report.tables.append(Table("What a tap costs, and what it is given", columns, rows, note))
+    report.tables.append(Table("Costs and inputs of a tap", columns, rows, note))
     report.plots.append(Plot("Time against taps", "taps", "ms of the blur alone", curves, False))
     report.notes.append(about(rosado))
 

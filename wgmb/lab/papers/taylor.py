@@ -34,8 +34,8 @@ def taylor(
     The small budget is the time of UNIT_RAYS = 8 rays per pixel; the paper gives 2 s on two
     threads of 2 GHz and no number of rays; a ray tracer of its day shaded one to two million
     rays per second on these, 2 to 4 million in 2 s, 8 to 16 per pixel of a 512 x 512 image;
-    the smaller is in favour of reprojection. Sharp frames have one ray a pixel. What a ray
-    costs differs from renderer to renderer, and these rays are well distributed, which his may
+    the smaller is in favour of reprojection. Sharp frames have one ray a pixel. The cost of
+    a ray differs from renderer to renderer, and these rays are well distributed, which his may
     not have been; so the rays per pixel that match reprojection at its best say more
     than the crossing points in time.
     """

@@ -32,14 +32,14 @@ class Gather:
     foreground and a background layer, so that each part of a mixed pixel follows its own motion;
     coverage is alpha in front of transparent pixels, else that of filtered vectors, else that of
     colours. The nearest sample is visible, the frame's own unless a neighbouring frame's is clearly
-    nearer; what all frames hide is filled from the surfaces around and behind.
+    nearer; surfaces that all frames hide are filled from the surfaces around and behind.
     `show`: "confidence" gives, instead of colour, the share of times at which a sample was
     accepted and its light followed, the share that neighbouring frames gave (backgrounds included),
     the mean residual [px] and the share that came over the picture's border, in no frame, as r, g,
     b, a.
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
-    the passes of light of the frame and of a neighbour tell it from what it falls on (see
+    the passes of light of the frame and of a neighbour separate it from the surfaces (see
     Frame.diffuse_light). "auto": by these, if the frame has them, else clear shadows on surfaces
     that rest, by their colours; "passes": by the passes, and an InputError if it has none;
     "frames": shadows by the colours alone everywhere, which is less sure; "off": shading stays that

@@ -18,8 +18,8 @@ PASSES = frozenset(name for pair in PAIRS for name in pair)
 def kinds_of(inputs: Inputs, shading: Shading) -> list[Kind]:
     """The kinds of light that are followed; none: shading stays that of the frame.
 
-    Without passes, a frame's colours tell of the light on what rests, if its vectors do so and
-    pixels have no weights.
+    Without passes, a frame's colours give the light on static surfaces, if its vectors mark
+    these and pixels have no weights.
     """
     if shading == "off":
         return []

@@ -1,4 +1,4 @@
-"""The search: what is visible at every pixel and time, composited and averaged."""
+"""The search: the visible surface at every pixel and time, composited and averaged."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Search:
         """Record the classification of blocks, then all pixels.
 
         The static cells of `worklists` are copied, if there are any.
-        `starts`: of searches, the tiles' candidates and what is scattered. `added`: moving light.
+        `starts`: of searches, the tiles' candidates and scattered motions. `added`: moving light.
         """
         # All passes of the search read the layers and the starts of the same frames.
         near = [frame.offset for frame in inputs.frames if abs(frame.offset) <= 1]

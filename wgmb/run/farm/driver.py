@@ -1,7 +1,7 @@
 """One run over a cluster: workers are given parts of the frames until all are done.
 
-A worker that dies costs what it was doing; a frame that kills its worker twice is named, and all
-others are done.
+A worker that dies loses its current frames, which others repeat; a frame that kills its worker
+twice is named, and all others are done.
 """
 
 from __future__ import annotations
@@ -425,7 +425,7 @@ class Driver:
             self._tidy(_END)
 
     def _tidy(self, seconds: float = _ANSWER) -> None:
-        """Remove what killed workers left, by a worker of each host; and the plugin."""
+        """Remove leftover files of killed workers, by a worker of each host; and the plugin."""
         from . import plugin
 
         if self._deaths:

@@ -33,11 +33,11 @@ class Encryption(Security):
     __slots__ = Security.__slots__  # the names of the settings that it takes
 
     def get_connection_args(self, role: str) -> dict[str, Any]:
-        """Return what a connection is opened with."""
+        """Return the arguments that open a connection."""
         return _with_sockets(super().get_connection_args(role))
 
     def get_listen_args(self, role: str) -> dict[str, Any]:
-        """Return what connections are accepted with."""
+        """Return the arguments that accept connections."""
         return _with_sockets(super().get_listen_args(role))
 
 

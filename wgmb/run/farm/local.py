@@ -1,7 +1,7 @@
 """Worker processes on this machine, for a farm without a scheduler elsewhere.
 
-What dask.distributed measures all the time for its dashboard, and what moves data between workers,
-is of no use to a run whose frames lie in files: it is switched off. Whoever reaches a scheduler or
+A run whose frames lie in files needs neither the measurements that dask.distributed takes for its
+dashboard nor its transfers between workers: both are switched off. Whoever reaches a scheduler or
 a worker can run code in it, and every user of a machine reaches its ports: all connections are
 encrypted, with keys that are made for the run and never written to disk. On Linux the modules are
 loaded once, by a process that the workers are forked from before anything else happens in it.

@@ -18,7 +18,7 @@ def share(report: BatchReport, numbers: Iterable[int]) -> None:
 
 
 def add(whole: BatchReport, part: BatchReport) -> None:
-    """Take in what became of other frames of the same sequence."""
+    """Add the outcome of other frames of the same sequence."""
     if part.done:  # whoever has read no frame has seen no mask
         is_first = not whole.done
         whole.unseen = _both(whole.unseen, part.unseen, is_first)

@@ -125,7 +125,7 @@ class BlurPlugin(WorkerPlugin):
             await asyncio.sleep(0.02)
 
     def sweep(self) -> None:
-        """Remove what dead processes of this host left of the run's own files."""
+        """Remove the run's unfinished files of dead processes of this host."""
         self._job.sweep()
 
 
@@ -145,7 +145,7 @@ def state_of(run: str, dask_worker: Worker) -> WorkerState | None:
 
 
 async def end(run: str, dask_worker: Worker) -> None:
-    """Let a worker end what it has begun."""
+    """Let a worker finish its current frame."""
     if plugin_name(run) in dask_worker.plugins:
         await _plugin(dask_worker, run).end()
 

@@ -10,7 +10,7 @@ from ..video import VideoPlan
 
 
 def places(plan: VideoPlan, count: int, length: Fraction) -> list[tuple[Fraction, Fraction]]:
-    """Begin and end in the input [s] of parts of a `length`, evenly spaced in what is wanted.
+    """Begin and end in the input [s] of parts of a `length`, evenly spaced in the selected part.
 
     The whole of it if the parts would meet.
     """

@@ -1,4 +1,4 @@
-"""Conventions of motion vectors: layers that programs write, and what the numbers in them mean."""
+"""Conventions of motion vectors: layers that programs write, and the meaning of their numbers."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def _manifest(crypto: Attributes, folders: Iterable[Path]) -> tuple[dict[str, ob
 
 @lru_cache(maxsize=4)  # frame after frame has the same, of up to a hundred thousand names
 def _parsed(text: str) -> dict[str, object] | None:
-    """None for what is no table."""
+    """None if it is no table."""
     try:
         manifest = json.loads(text)
     except (ValueError, RecursionError):

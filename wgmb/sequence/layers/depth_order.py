@@ -1,4 +1,4 @@
-"""Order of depth, by what covers what: near surfaces hide far ones where they meet.
+"""Order of depth, by occlusion: near surfaces hide far ones where they meet.
 
 Two pixels that move to one place of a neighbouring frame differ in depth; that place shows the
 nearer one.

@@ -1,4 +1,4 @@
-"""Passes of light by the names that renderers give them: what falls on surfaces, and their colour.
+"""Passes of light by the names that renderers give them: the light on surfaces, and their colour.
 
 Blender writes light before it is multiplied by the surface's colour, Arnold after it, V-Ray both
 ("raw" is before it). Blender 5.0 spells its names out.
@@ -102,7 +102,7 @@ class LightPasses:
     lights: tuple[Light, ...] = ()
     lacking: str | None = None
     unused: tuple[str, ...] = ()
-    """Layers of light that is not followed: what glass lets through, and volumes."""
+    """Layers of light that is not followed: through glass, and of volumes."""
 
     @property
     def text(self) -> str:
@@ -167,7 +167,7 @@ def is_pass(layer: str) -> bool:
 
 
 def read(channels: Mapping[str, np.ndarray], passes: LightPasses) -> dict[str, np.ndarray]:
-    """Fields of Frame, (height, width, 3) float32; none of what is black everywhere."""
+    """Fields of Frame, (height, width, 3) float32; none that are black everywhere."""
     fields: dict[str, np.ndarray] = {}
     for light in passes.lights:
         color = _stacked(channels, light.color)

@@ -30,7 +30,7 @@ _AMOUNT = re.compile(r"(.+):([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 @dataclass
 class Masks:
-    """The masks of a sequence, as Passes has them: what is held out, and what scales motion."""
+    """The masks of a sequence, as Passes has them: holdouts, and scales of motion."""
 
     held_out: Sequence[str]
     scales: Sequence[str]

@@ -106,7 +106,7 @@ def find_color(names: Iterable[str], wanted: str | None = None) -> list[str]:
     """The channels of the picture: 3, or 4 with alpha.
 
     Where there are no R, G and B, a grey picture, three times Y; then one with R, G or B alone,
-    and "" for what it lacks.
+    and "" for the others.
     """
     names = list(names)
     for channels_of in (rgb, _grey, _some_of_rgb):

@@ -19,7 +19,7 @@ class Passes:
     `color`, `depth`: names of layers that cannot be found automatically. `depth_kind`: "planar"
     (distance along the view axis), "inverse" (its reciprocal, Nuke), "clip" (z after projection),
     "white-near" (larger is nearer, and nothing else is known of it; not with a camera), or "auto":
-    planar, or white-near where what covers what shows it. `camera`: JSON file (see CameraFile) for
+    planar, or white-near where occlusion shows it. `camera`: JSON file (see CameraFile) for
     motion where vectors are missing. `object_layer`: index layer that identifies the camera file's
     objects. `object_motion`: vectors exclude the camera's motion. `holdout`, `scale`: masks, each a
     layer, `LAYER=VALUE`, or an image file or pattern; VALUE is an index, or a name (with wildcards)

@@ -86,7 +86,7 @@ class ConventionFinder:
         return min(filter(None, findings), key=lambda one: one.left if one.sure else 1.0)
 
     def _test(self, look: Look, which: int) -> vector_test.ConventionFinding | None:
-        """The finding by what `look` gives of a frame and of its neighbours.
+        """The finding from the `look` of a frame and of its neighbours.
 
         `which` of the readings of the vectors is tested; None if there are not so many.
         """
@@ -175,7 +175,7 @@ class ConventionFinder:
 
     @property
     def depth_kind(self) -> str:
-        """The kind of depth: as it was asked for, or found by what covers what."""
+        """The kind of depth: as requested, or found by occlusion."""
         asked = self._stored.passes.depth_kind
         if asked != "auto":
             return asked

@@ -340,7 +340,7 @@ class _Probes:
         ]
 
     def difference(self, reading: _Reading) -> float:
-        """Mean difference of warped neighbours, robust against what appears and disappears."""
+        """Mean difference of warped neighbours, robust against things that appear and disappear."""
         scales = zip("xy", (reading.x, reading.y), strict=True)
         factor = np.array([-s if axis in reading.flip else s for axis, s in scales], np.float32)
         total, count = 0.0, 0

@@ -1,6 +1,6 @@
 """Motion vectors as programs write them -> to_prev, to_next in pixels, y down.
 
-Foreign conventions end here. A convention is what the numbers mean; vector_test.py finds out
+Foreign conventions end here. A convention is the meaning of the numbers; vector_test.py finds out
 whether they do.
 """
 

@@ -36,13 +36,13 @@ class Packed:
         self._staging: wgpu.GPUBuffer | None = None
 
     def buffer(self, places: list[PlaneSlot]) -> wgpu.GPUBuffer:
-        """The buffer for these planes; what is in it is undefined."""
+        """The buffer for these planes; its contents are undefined."""
         return self._buffer.at_least(4 * _words(places))
 
     def read(
         self, encoder: wgpu.GPUCommandEncoder, places: list[PlaneSlot], coding: Coding
     ) -> CodedPicture:
-        """Submit what wrote the buffer, and return the planes."""
+        """Submit the passes that write the buffer, and return the planes."""
         size, usage = 4 * _words(places), wgpu.BufferUsage
         if self._staging is None or self._staging.size != size:
             self._staging = self._device.create_buffer(

@@ -38,7 +38,7 @@ class Box(NamedTuple):
 
 
 def boxes(file: BinaryIO, begin: int, end: int) -> Iterator[Box]:
-    """The boxes from `begin` to `end`, until what is no box."""
+    """The boxes from `begin` to `end`, up to the first bytes that are no box."""
     while begin + 8 <= end:
         file.seek(begin)
         head = file.read(16)
@@ -119,7 +119,7 @@ class _Counts:
     def _holds(self, file: BinaryIO, box: Box, depth: int) -> bool:
         """Return True for a box that holds others, as `moov` and all that is in it may.
 
-        FFmpeg looks for an index also in what a program marked as free.
+        FFmpeg looks for an index also in boxes that are marked as free.
         """
         if box.kind in (b"free", b"hoov"):
             inner = next(boxes(file, box.begin, box.end), None)

@@ -64,7 +64,7 @@ def _is_told(tag: int, which: int) -> bool:
 def assumed(
     of: PlaneLayout, size: tuple[int, int], codec: str, tags: Tags
 ) -> tuple[Coding, tuple[str, ...]]:
-    """The Coding with these tags, and what had to be assumed, in words.
+    """The Coding with these tags, and the assumptions, in words.
 
     Untagged pictures are BT.709 if they are 1280 pixels wide or over 576 high, else BT.601; RGB is
     sRGB. So do players, and so did those who left the tags out. Where either the matrix or the

@@ -1,4 +1,4 @@
-"""Open video files for reading; what is wrong with one, in one line."""
+"""Open video files for reading; a fault is an error of one line."""
 
 from __future__ import annotations
 

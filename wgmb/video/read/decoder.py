@@ -30,7 +30,7 @@ class Decoder:
         """Frames and their numbers, which ascend, from one at or before `first` on.
 
         Frames that cannot be decoded are left out. Several threads decode until there is an error,
-        because they lose more than what is damaged; then one does. Frames are counted from where
+        because they lose undamaged pictures, too; then one does. Frames are counted from where
         their times turn out to be those of decoding. Others may be asked for meanwhile, in other
         threads.
         """

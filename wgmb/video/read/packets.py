@@ -112,7 +112,7 @@ def _hides_vp9(data: memoryview) -> bool:
 
 
 def _hides_gif(data: memoryview) -> bool:
-    """Return True for what follows the last picture, such as a comment (GIF89a, 24)."""
+    """Return True for blocks behind the last picture, such as a comment (GIF89a, 24)."""
     at = 0
     while data[at : at + 1] == b"!":  # an extension, whose blocks tell their lengths
         at += 2

@@ -68,8 +68,8 @@ class VideoReader:
 
     Pictures have numbers from 0 on and are at `times` [s], on the clock that the file's streams
     share. `rate`: pictures a second, usually; `is_variable` if the times keep no steady rate.
-    `size` [px] is that of upright pictures. `assumed`: what the file does not say about its colours
-    and what is taken instead. `notes`: lines that a user should know. Numbers of the pictures,
+    `size` [px] is that of upright pictures. `assumed`: colour tags that the file lacks,
+    and the values assumed. `notes`: lines that a user should know. Numbers of the pictures,
     of those asked for so far, that could not be decoded are `missing`; that the decoder mended,
     `damaged`; that had another size, `scaled`. `index`: of their stream in the file.
 
@@ -98,7 +98,7 @@ class VideoReader:
         apart(self._probe)
 
     def _read_packets(self) -> None:
-        """Read what the file says of itself, and the times of its packets.
+        """Read the tags of the file, and the times of its packets.
 
         The thread that opens the file also closes it: it may be left while FFmpeg reads.
         """
@@ -146,7 +146,7 @@ class VideoReader:
         limits.check(self.path, f"{width} x {height}", promised, stored, self._max_mb)
 
     def _probe(self) -> None:
-        """Decode one picture: what it says of itself counts more than what the header says."""
+        """Decode one picture: its own tags count more than those of the header."""
         if self._packets.is_encrypted:  # some of its noise may be taken for pictures
             raise InputError(f"{self.path}: is encrypted")
         with opened(self.path, self._max_mb, is_known=True) as container:
@@ -279,7 +279,7 @@ class VideoReader:
     def begin(self, others: Collection[int] = ()) -> Fraction:
         """The time of the first picture [s], or of those `others` of its streams that begin before.
 
-        What a decoder of sound begins with, shortly before 0, is no sound.
+        Priming samples of a decoder of sound, shortly before 0, are no sound.
         """
         begins = [self._packets.begins.get(number, self.times[0]) for number in others]
         return min([self.times[0], *(max(t, Fraction(0)) if t >= PRIMING else t for t in begins)])

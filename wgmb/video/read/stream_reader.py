@@ -41,7 +41,7 @@ _LACKS = Fraction(1, 10)  # seconds that a stream may be shorter than it states,
 class StreamReader:
     """Reads the pictures of a video once. `name`: of the stream, for messages.
 
-    `color`: a name in COLORS, instead of what the stream says. `keeps_time`: the times of the
+    `color`: a name in COLORS, instead of the tags of the stream. `keeps_time`: the times of the
     pictures count, and must be multiples of an interval; else each picture lasts one. `pause`:
     how long one may be missing [s]. InputError in one line for a stream that cannot be read so, and
     for pictures that would take more than `max_mb` megabytes each.
@@ -180,7 +180,7 @@ class StreamReader:
         return steps
 
     def _decoded(self) -> Iterator[av.VideoFrame]:
-        """The frames in order; what cannot be decoded is left out, and counted."""
+        """The frames in order; those that cannot be decoded are left out, and counted."""
         packets, end = self._container.demux(self._stream), Fraction(0)
         while True:
             try:
@@ -207,12 +207,12 @@ class StreamReader:
 
 
 def only_pictures(kinds: Iterable[str]) -> str:
-    """A line on what a video has besides its pictures, which no pipe carries here."""
+    """A line on the other streams of a video, which no pipe carries here."""
     return f"only its pictures go through a pipe; left out: {', '.join(dict.fromkeys(kinds))}"
 
 
 class _Source:
-    """A stream as FFmpeg reads it, which cannot pass on what is raised meanwhile."""
+    """A stream as FFmpeg reads it; FFmpeg cannot pass on exceptions."""
 
     def __init__(self, stream: BinaryIO):
         self._stream = stream
@@ -231,7 +231,7 @@ class _Source:
         return data
 
     def check(self) -> None:
-        """Raise what was raised while it was read."""
+        """Raise the exception that was raised while it was read."""
         if self._raised is not None:
             raise self._raised
 

@@ -60,7 +60,7 @@ def _read(text: str) -> StreamText:
 def cropped(
     planes: tuple[np.ndarray, ...], crop: tuple[int, int, int, int], steps: tuple[int, int]
 ) -> tuple[np.ndarray, ...]:
-    """The planes of a picture without what is not to be shown; `steps`: pixels to one of chroma.
+    """The planes of a picture within its crop; `steps`: pixels to one of chroma.
 
     The numbers of `crop` are multiples of `steps`, see `whole_samples`.
     """

@@ -109,8 +109,8 @@ class Timeline:
     def rate(self) -> Fraction:
         """Pictures a second, by the mean of the steps without gaps and hitches; 24 without steps.
 
-        The rate that the file states if all times are those of it, rounded; else the nearest known
-        rate if it is within 0.1 %, or within what the clock's rounding makes of a few steps.
+        The rate that the file states if all times are multiples of it, rounded; else the nearest
+        known rate if it is within 0.1 %, or within the rounding of the clock over a few steps.
         """
         steps = self.steps
         if not len(steps):

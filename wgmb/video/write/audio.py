@@ -88,7 +88,7 @@ class SoundAtSpeed:
         yield from self._within(samples)
 
     def _within(self, samples: np.ndarray) -> Iterator[np.ndarray]:
-        """Without what is after the clock's end."""
+        """Without the samples after the clock's end."""
         count = samples.shape[1]
         if self._clock.end is not None and self._begin is not None:
             left = round((self._clock.end - self._begin) * self._rate) - self._received
@@ -137,7 +137,7 @@ class Resampled:
         return self._pulled(len(samples))
 
     def rest(self) -> np.ndarray:
-        """Return what is left; nothing can be added then."""
+        """Return the remaining samples; nothing can be added then."""
         if not self._received:
             return np.zeros((1, 0), np.float32)
         self._graph.push(None)

@@ -38,7 +38,7 @@ _MUXING = {"matroska": _MATROSKA, "webm": _MATROSKA, "mp4": {"strict": "unoffici
 class NewFile:
     """A file of some container. Until `close` there is nothing at `path`.
 
-    `metadata`: texts of the whole file; what it cannot hold of them is in `left_out`. `record`:
+    `metadata`: texts of the whole file; those that it cannot hold are in `left_out`. `record`:
     see io/record.py; it gets its seal if the file `is_complete`. `mode`: see atomic.mode_of.
     `is_new`, which may be set: no file of another process is replaced. OSError, whose text names
     `path`, if it cannot be written.
@@ -104,7 +104,7 @@ class NewFile:
         self._unlock()
 
     def _add_texts(self) -> None:
-        """Put into the complete file what FFmpeg does not write: a GIF's comment, the record."""
+        """Add parts that FFmpeg does not write to the whole file: a GIF's comment, the record."""
         if self.path.suffix.lower() == ".gif":
             for text in self._texts.values():
                 record_block.comment(self.temporary, text)
@@ -181,7 +181,7 @@ class VideoFile(NewFile):
             raise _why(path, format.encoding, error) from None
 
     def encode(self, frame: av.VideoFrame | None, tick: int = 0) -> None:
-        """Write what can be written once `frame`, of the encoder's format, is there."""
+        """Encode `frame`, of the encoder's format, and write the packets that are ready."""
         if frame is not None:
             frame.pts, frame.time_base = tick, self._base
             self._packets += 1
@@ -201,7 +201,7 @@ class VideoFile(NewFile):
         return packets
 
     def finish(self) -> None:
-        """Write what the encoder still holds."""
+        """Write the packets that the encoder still holds."""
         self.encode(None)
 
 

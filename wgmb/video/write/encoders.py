@@ -235,7 +235,7 @@ class Encoding:
         return next(n for n in self.encoder.pixels if _holds(n) == _of(coding))
 
     def coding(self, wanted: Coding) -> tuple[Coding, list[str]]:
-        """The Coding nearest to `wanted` that the encoder takes; and what is lost, in words."""
+        """The Coding nearest to `wanted` that the encoder takes; and the losses, in words."""
         near = wanted
         if wanted.model == "rgb" and self.codec not in _OF_RGB:
             near = replace(wanted, model="yuv", steps=(2, 2))
@@ -278,8 +278,8 @@ def chosen(
     """Encoding for the video `path`.
 
     `codec`: a name in CODECS, by default the first that the suffix is for. `quality`: instead of
-    the codec's own. `encoder`: a kind of HARDWARE; None is software. InputError for what does not
-    fit together, and for an encoder that this FFmpeg lacks.
+    the codec's own. `encoder`: a kind of HARDWARE; None is software. InputError for settings that
+    do not fit together, and for an encoder that this FFmpeg lacks.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:

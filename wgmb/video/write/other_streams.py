@@ -1,8 +1,9 @@
 """Streams of a video besides its pictures, copied beside other pictures.
 
 Sound, subtitles, covers and attachments are copied packet for packet, with languages, titles and
-dispositions; chapters and the file's own texts and dates come along. What the new container cannot
-hold is left out, and said. Times go by a Clock; at another speed, sound is encoded again.
+dispositions; chapters and the file's own texts and dates come along. Streams that the new
+container cannot hold are left out, and reported. Times go by a Clock; at another speed, sound is
+encoded again.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class OtherStreams:
         return self._texts
 
     def attach(self, to: OutputContainer) -> list[str]:
-        """Add the streams and chapters; return what is left out, in words."""
+        """Add the streams and chapters; return the losses, in words."""
         said: list[str] = []
         unknown: list[int] = []
         for stream in self._container.streams:
@@ -111,7 +112,7 @@ class OtherStreams:
         return stream.type == "data" and chapters > 0 and (is_text or stream.frames == chapters)
 
     def _describe_pictures(self, stream: VideoStream, to: OutputContainer) -> list[str]:
-        """Give the new pictures the texts of the old ones; return what is left out, in words."""
+        """Give the new pictures the texts of the old ones; return the losses, in words."""
         into = to.streams.video[0]
         texts = {key.lower(): text for key, text in stream.metadata.items()}
         into.metadata.update({key: texts[key] for key in _OWN if key in texts})
@@ -239,7 +240,7 @@ class _Copied:
         packet.dts = dts + packet.pts - shown if self._clock.speed == 1 else packet.pts
 
     def _fits(self, packet: Packet[Any]) -> bool:
-        """Shorten a subtitle to the clock's part; return False for what is outside."""
+        """Shorten a subtitle to the clock's part; return False if all of it is outside."""
         assert packet.pts is not None
         base, clock = packet.time_base, self._clock
         begins, until = packet.pts * base, (packet.pts + (packet.duration or 0)) * base
@@ -259,7 +260,7 @@ class _Copied:
 
 
 def _is_cut(packet: Packet[Any]) -> bool:
-    """Return True for what an edit list leaves out, but not for what decoders begin with."""
+    """Return True for packets that an edit list leaves out, but not for priming packets."""
     assert packet.pts is not None
     return packet.is_discard and not PRIMING <= packet.pts * packet.time_base < 0
 

@@ -1,7 +1,7 @@
 """A video in segments, so that a run that was killed can go on.
 
 Segments of about ten seconds are encoded one by one, in a folder beside the video, in its own kind
-of container. Each is complete or absent, and beside it stands the record of what it was made of and
+of container. Each is complete or absent, and beside it is a record of its inputs and settings, and
 a checksum (see record.py). When all are there their packets are copied into the video, at the times
 that one run would have given them, and the folder is removed.
 """
@@ -43,7 +43,7 @@ _PART = 1 << 20  # bytes that are read at once
 class Segments:
     """The segments of the video `path`, whose pictures are shown at `times` [s].
 
-    `made_of`: what pictures depend on (settings, inputs); segments that were made of anything else
+    `made_of`: dependencies of the pictures (settings, inputs); segments with other dependencies
     are made again. Use: for every range of numbers in `to_do`, `begin` it, add its pictures, close
     it; then `join`; `release` in any case. `mode`: permissions of the video and of the segments,
     see atomic.mode_of. InputError for a GIF, which has no segments.
@@ -93,7 +93,7 @@ class Segments:
         return Segment(self, index, VideoWriter(path, temporary, self._format, mode=self._mode))
 
     def join(self, record: str = "", others: OtherStreams | None = None) -> list[str]:
-        """Write the video, with `others` beside its pictures; return what is left out, in words.
+        """Write the video, with `others` beside its pictures; return the losses, in words.
 
         `record`: see io/record.py. InputError if a segment lacks or does not hold its pictures.
         """
@@ -175,7 +175,7 @@ class Segments:
         )
 
     def _claimed(self) -> None:
-        """Make the folder, without what dead runs left half done, and tell others it is in use."""
+        """Make the folder, without unfinished files of dead runs, and mark it as in use."""
         if self._claim is not None:
             return
         try:
@@ -247,7 +247,7 @@ def folder_of(path: Path) -> Path:
 def remove_left(path: Path) -> None:
     """Remove the segments that runs which have ended left of the video `path`.
 
-    Nothing is touched while another run makes them, and what is not a segment stays.
+    Nothing is touched while another run makes them, and other files stay.
     """
     folder = folder_of(path)
     if not folder.is_dir() or folder.is_symlink():
@@ -263,7 +263,7 @@ def remove_left(path: Path) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what dead runs were writing into a folder of segments."""
+    """Remove unfinished segments of dead runs from a folder."""
     atomic.sweep(folder, lambda name: name == _CLAIM or bool(_NAME.fullmatch(name)))
 
 

@@ -37,7 +37,7 @@ class MatroskaStream:
         self._out.pictures = self._count
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the remaining data."""
         self._container.mux(self._stream.encode(None))
         self._container.close()
 

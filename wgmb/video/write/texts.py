@@ -19,7 +19,7 @@ _SECOND_NAME = re.compile(r"(.+)-[a-z]{3}")  # of a text that states its languag
 
 
 def fitting(suffix: str, texts: dict[str, str]) -> tuple[dict[str, str], dict[str, str], list[str]]:
-    """The texts that a file of this kind holds, the muxer's options for them, and what is lost.
+    """The texts that a file of this kind holds, the muxer's options for them, and the losses.
 
     `texts`: by FFmpeg's names. What is lost is in words, for the reader. Facts about the input's
     file and records of it (see io/record.py) are no texts of the new file. MP4 has a list of

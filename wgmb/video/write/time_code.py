@@ -11,7 +11,7 @@ _DAY = 24 * 60 * 60
 
 
 def moved(text: str, rate: Fraction, by: Fraction, to: Fraction) -> str:
-    """The time code `by` seconds later, at the rate `to`; '' for what is no time code.
+    """The time code `by` seconds later, at the rate `to`; '' if it is no time code.
 
     `text`: such as 01:02:03:04, or with a semicolon before the frames if numbers are left out
     (drop frame). `rate`: frames a second that it counts.

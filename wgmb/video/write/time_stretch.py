@@ -53,7 +53,7 @@ class TimeStretch:
         return self._go_on(samples, final=False)
 
     def rest(self) -> np.ndarray:
-        """Return what is left; nothing can be added then."""
+        """Return the remaining samples; nothing can be added then."""
         silence = self._ahead + 2 * self._hop + int(self._hop * self._speed)
         return self._go_on(np.zeros((len(self._input), silence), np.float32), final=True)
 
@@ -123,7 +123,7 @@ class TimeStretch:
         self._onsets.forget(first - self._hop)
 
     def _cut(self, samples: np.ndarray, final: bool) -> np.ndarray:
-        """Without the half piece before the beginning, and what is after the end."""
+        """Without the half piece before the beginning, and the samples after the end."""
         begin = min(max(self._hop - self._taken, 0), samples.shape[1])
         end = samples.shape[1]
         if final:
@@ -133,7 +133,7 @@ class TimeStretch:
 
 
 class Onsets:
-    """Finds where sounds begin: a few milliseconds louder than what was before."""
+    """Finds the onsets of sounds: a few milliseconds louder than those before."""
 
     def __init__(self, rate: int):
         self.samples: list[int] = []

@@ -31,7 +31,7 @@ class VideoWriter:
     repeated (VideoFormat.padding). A GIF counts hundredths of a second, and has 256 colours a
     picture. OSError if the file cannot be written, InputError for an encoder
     that does not start. `others`: streams to put beside the pictures, with their texts and
-    dates; what of them the file cannot hold is in `left_out`. `record`: see io/record.py. `is_new`:
+    dates; those that the file cannot hold are in `left_out`. `record`: see io/record.py. `is_new`:
     OSError, when it is closed, where another process has made a file of this name meanwhile.
     `mode`: its permissions, see atomic.mode_of.
     """
@@ -110,7 +110,7 @@ class VideoWriter:
             self.file.encode(frame, tick)
 
     def _paint(self, palettes: Palettes, frame: av.VideoFrame | None, tick: int = 0) -> None:
-        """Encode a picture of a GIF, or what is left of it."""
+        """Encode a picture of a GIF, or its changed part."""
         for painted, at in palettes.of(frame, tick):
             self.file.encode(painted, at)
 

@@ -12,8 +12,8 @@ QUICK = 4  # the fewest samples while something moves
 class Pace:
     """Level of detail during motion: the finest one whose frames take `target` seconds at most.
 
-    Where what no level changes takes most of that time, pixels may take as long once more: to draw
-    fewer would save little. A level that was too fine is tried again ever later.
+    Where most of that time does not depend on the level, pixels may take as long once more: to
+    draw fewer would save little. A level that was too fine is tried again ever later.
     """
 
     TARGET = 0.08  # seconds from one frame of the window to the next
@@ -37,7 +37,7 @@ class Pace:
         return max(samples // self.FEWER[level], min(samples, QUICK))
 
     def observe(self, seconds: float, drawing: float, antialias: int) -> None:
-        """A moving frame took so long, `drawing` of it for what depends on the level."""
+        """A moving frame took so long, `drawing` of it for the part that depends on the level."""
         self._took.append((seconds, drawing))
         if len(self._took) < 3:
             return
@@ -64,7 +64,7 @@ class Pace:
             self._quick = 0
 
     def _unchanged(self, took: float, antialias: int) -> float:
-        """Seconds of a frame that do not depend on the level, by what the level before took."""
+        """Seconds of a frame that do not depend on the level, by those of the level before."""
         if self._before is None:
             return 0.0
         level, seconds = self._before

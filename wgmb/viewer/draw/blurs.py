@@ -102,7 +102,7 @@ class Blurs:
 
     @contextmanager
     def kept_if_done(self, blur: Blur):
-        """Forget the Blur if what it draws is dropped: what it keeps of a frame is not whole."""
+        """Forget the Blur if its drawing is dropped: its data of a frame are incomplete then."""
         try:
             yield
         except DroppedError:

@@ -62,7 +62,7 @@ class View:
     ratio: float
     """Pixels for one of the panel's."""
     report: FrameStatus
-    """Of the images: what is written over them."""
+    """Of the images: the text over them."""
     flicked: bool = False
     """The first image is that of the second side."""
 
@@ -107,7 +107,7 @@ class Composer:
         self.seconds = 0.0  # that the last composing took
 
     def compose(self, view: View) -> None:
-        """Draw it, unless it is what was drawn last."""
+        """Draw it, unless it was drawn last."""
         stamp = view.stamp
         if stamp == self._composed:
             return
@@ -135,7 +135,7 @@ class Composer:
         return self._texture or self._sized((1, 1))
 
     def download(self) -> np.ndarray:
-        """(height, width, 4) of what was composed."""
+        """(height, width, 4) of the composed picture."""
         encoder = self.device.create_command_encoder(label="download")
         return self._images.download(encoder, self.texture)
 
@@ -144,7 +144,7 @@ class Composer:
         return visible(self.download(), self._visible, self._format)
 
     def values(self, x: float, y: float) -> np.ndarray | None:
-        """(3,) display values 0..1 of what was composed at a place [px]; None outside it."""
+        """(3,) display values 0..1 of the composed picture at a place [px]; None outside it."""
         texture = self.texture
         if not (0 <= x < texture.size[0] and 0 <= y < texture.size[1]):
             return None
@@ -202,7 +202,7 @@ def draw(
     target: wgpu.GPUTexture,
     band: tuple[int, int, int, int],
 ) -> None:
-    """One pass of a rasterizer over a band of `target`; what it binds, in order."""
+    """One pass of a rasterizer over a band of `target`; its bindings, in order."""
     encoder = device.create_command_encoder(label="view")
     load = "clear" if band == (0, 0, *target.size[:2]) else "load"
     attachment = {"view": target.create_view(), "load_op": load, "store_op": "store"}

@@ -14,7 +14,7 @@ _SETTLE = 0.35  # seconds of stillness before antialiasing
 
 
 class Detail:
-    """The level of detail and the method, by what was drawn before and how long it took.
+    """The level of detail and the method, by earlier drawings and how long they took.
 
     `is_slow`: the quickest method comes first, and while something moves. `target`: seconds that
     a frame may take then.

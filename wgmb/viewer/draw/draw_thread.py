@@ -44,7 +44,7 @@ class _Answer:
 
 
 class DrawThread:
-    """Draws what is requested with a device of its own; `draw` returns the last answer at once.
+    """Draws requests with a device of its own; `draw` returns the last answer at once.
 
     `news` is called in the thread when there is an answer.
     """
@@ -66,7 +66,7 @@ class DrawThread:
         """The last answer, None before the first; `request` is worked on from now on.
 
         As long as there are no numbers for the inspector, they are the first image's light.
-        What went wrong with a request for the same picture is raised.
+        The error of a request for the same picture is raised.
         """
         with self._changed:
             if request != self._wanted:
@@ -91,7 +91,7 @@ class DrawThread:
 
     @property
     def chromaticities(self) -> dict[str, Any]:
-        """Of what is shown, as an attribute of an EXR."""
+        """Of the picture shown, as an attribute of an EXR."""
         return self._taken.drawn.chromaticities if self._taken else {}
 
     def download(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A Display's own shader: pictures become what OpenColorIO shows, on the GPU.
+"""A Display's own shader: OpenColorIO's transform of pictures, on the GPU.
 
 OpenColorIO writes GLSL with the bindings in it, so this is the one shader that is not WGSL.
 """
@@ -114,7 +114,7 @@ class OcioShader:
         return texture
 
     def show(self, light: wgpu.GPUTexture, exposure: float, display: wgpu.GPUTexture) -> None:
-        """Put what `light`, times `exposure`, looks like into `display`, of the same size."""
+        """Transform `light`, times `exposure`, into `display`, of the same size."""
         data = np.full(4, exposure, np.float32)
         factor = self._device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
         resources: list[Any] = [

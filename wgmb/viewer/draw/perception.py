@@ -1,6 +1,6 @@
 """Perceived image of the last frames: each drawn once, held for its duration, weighted.
 
-Nothing depends on what was looked at before: the frames are those that a display would have
+Nothing depends on earlier pictures: the frames are those that a display would have
 shown up to the moment, all as they are set now. Frames and windows are centred alike: frame N
 is there from half an interval before its instant to half an interval after it.
 """
@@ -35,7 +35,7 @@ class _Held:
 
 
 def seen_frames(state: State) -> list[State]:
-    """The state at each frame that counts in what is perceived, the newest first."""
+    """The state at each frame that counts in the perceived picture, the newest first."""
     newest = math.floor(state.moment + 0.5)
     if not state.is_video:
         count = state.eye.frames_needed(state.fps) if state.eye else 1
@@ -74,8 +74,8 @@ class Perceived:
     ) -> int:
         """Draw frames that are missing, the newest first, for about `seconds`; how many are done.
 
-        `output`, rgba32float, is what is seen; the oldest frame stands for those before it.
-        `known`: of a video, what is known of the motion of each of `seen_frames`.
+        `output`, rgba32float, is the perceived picture; the oldest frame stands for those before
+        it. `known`: of a video, the known motion of each of `seen_frames`.
         """
         width, height, _ = output.size
         alike = (replace(state.picture, frame=0.0), view, (width, height), antialias, blur)

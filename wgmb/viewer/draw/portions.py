@@ -13,7 +13,7 @@ from ...gpu.timing import WallClock
 
 
 class DroppedError(Exception):
-    """Nobody wants what was being drawn any more."""
+    """The drawing in progress is not needed any more."""
 
 
 class Portions(WallClock):

@@ -1,7 +1,7 @@
 """A State becomes one or two images on the GPU, a bit at a time, so that no frame takes long.
 
 While something moves, scenes are drawn as small as keeps the window quick (Pace); when all
-is still the picture is drawn in full, and what converges (rays, the reference) goes on.
+is still the picture is drawn in full, and methods that converge (rays, the reference) go on.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _PASSES = {"sharp": "color", "depth": "depth", "velocity": "motion"}
 
 
 class Renderer:
-    """The textures of what is shown, and the passes that draw them.
+    """The textures of the picture, and the passes that draw them.
 
     `timing`: a clock of the passes, by default that of the device, if it has one. `target`:
     seconds that a frame may take while something moves.
@@ -72,7 +72,7 @@ class Renderer:
         self._inspected = Inspected(device, self.choices, self._blurs, self._timing)
 
     def draw(self, request: Request, now: float) -> Drawn:
-        """Go on with what is requested, `now` [s]; InputError if it cannot be shown."""
+        """Go on with the request, `now` [s]; InputError if it cannot be shown."""
         choices = self.choices
         light = None if request.full else choices.first_light(request.state)
         if light is not None:
@@ -116,7 +116,7 @@ class Renderer:
         return Drawn(request, state, report, available, self._on_screen)
 
     def update(self, state: State, area: Box, now: float, moving: bool, full: bool) -> FrameStatus:
-        """Go on with what `state` shows in `area` [px] of the canvas, `now` [s].
+        """Go on with the picture of `state` in `area` [px] of the canvas, `now` [s].
 
         `moving`: quick is better than fine. `full`: everything now, however long it takes.
         """
@@ -184,7 +184,7 @@ class Renderer:
         return self._slots["first"].image
 
     def close(self) -> None:
-        """End what goes on beside the window."""
+        """End all work beside the window."""
         self.choices.close()
 
     def _displayed(
@@ -251,7 +251,7 @@ class Renderer:
         full: bool,
         report: FrameStatus,
     ) -> None:
-        """Draw some of `name`; it is shown once it is no coarser than what it replaces."""
+        """Draw some of `name`; it is shown once it is no coarser than the picture it replaces."""
         shown, coming = self._slots[slot], self._coming[slot]
         is_kept = name == KEPT
         if is_kept:

@@ -71,7 +71,7 @@ class Drawn:
     """Images for numbers or arrows, if these are shown, (height, width, channels): "light" of the
     first image, and "depth", "motion" (px) and "confidence" where there are such."""
     chromaticities: dict[str, Any] = field(default_factory=dict)
-    """Of what is shown, as an attribute of an EXR."""
+    """Of the picture shown, as an attribute of an EXR."""
 
     def sides(self, flicked: bool) -> tuple[Image, Image]:
         """The images of both sides; `flicked`: the second one for both, once it is there."""
@@ -79,7 +79,7 @@ class Drawn:
         return (second if flicked and second != NOTHING else first), second
 
     def corrected(self, state: State) -> State:
-        """A state, with what is not possible here replaced as in `self.state`."""
+        """A state, with impossible settings replaced as in `self.state`."""
         asked, found = self.request.state, self.state
         if asked.method == state.method != found.method:
             state = state.with_method(found.method)

@@ -32,7 +32,7 @@ class Screen:
         self._composed = view
 
     def paint(self, target: wgpu.GPUTexture) -> None:
-        """Put what was composed on the canvas's texture."""
+        """Put the composed picture on the canvas's texture."""
         self._painter.paint(self._composer.texture, target)
         self.painted = self._composed
 
@@ -96,7 +96,7 @@ class ScreenThread:
             self._put(ready[1], target)
 
     def _put(self, texels: np.ndarray, target: wgpu.GPUTexture) -> None:
-        """Copy what is on the canvas, from a texture that is written only when it changes.
+        """Copy the canvas's picture, from a texture that is written only when it changes.
 
         Most frames of the window are for its panel, and to write takes six times as long.
         """

@@ -18,8 +18,8 @@ class StandIn:
     """Choice between the method that is set and the quickest one, while something moves.
 
     The one that is set is used as long as its frames take `target` seconds at most, at half the
-    width or more. It is tried where that is to be expected, by what its still images took, or
-    because the quickest one takes much less; where it proves too slow, again ever later.
+    width or more. It is tried where that is likely, by the times of its still images, or because
+    the quickest one takes much less; where it proves too slow, again ever later.
     """
 
     def __init__(self, target: float):
@@ -38,7 +38,7 @@ class StandIn:
         self._took: deque[float] = deque(maxlen=3)
 
     def begin(self, key: tuple) -> None:
-        """Forget all that was observed, if `key`, what is drawn by which method, is another one."""
+        """Forget all observations, if `key` (the picture and its method) is another one."""
         if key != self._key:
             self._key = key
             self._begin_anew()
@@ -52,8 +52,8 @@ class StandIn:
     ) -> bool:
         """Take note of a moving frame of `pixels`; False if the next one has the other method.
 
-        It took so long, `drawing` of it for what depends on its pixels. `fewest` that the method
-        that is set would be drawn with.
+        It took so long, `drawing` of it for the part that depends on its pixels. `fewest` that the
+        method that is set would be drawn with.
         """
         if self.is_needed:
             known = seconds - drawing + self._pixel * fewest

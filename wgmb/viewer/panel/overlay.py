@@ -15,7 +15,7 @@ _BEHIND = (0.05, 0.05, 0.06, 0.72)
 
 
 def describe(view: View, area: Box) -> None:
-    """Write over a view that is on the canvas, in an area [logical px], what it shows."""
+    """Label a view on the canvas, in an area [logical px]."""
     (x, y, width, _), report = area, view.report
     _name_images(view, x, y + 12, width)
     if view.key is not None:

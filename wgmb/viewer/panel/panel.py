@@ -21,7 +21,7 @@ _HIGH, _TALL = 830.0, 1000.0  # windows so high show more opened, and all [logic
 
 
 class Panel:
-    """Draws the panel; `places` says where its widgets are, `actions` what was asked for."""
+    """Draws the panel; `places` says where its widgets are, `actions` lists the requests."""
 
     def __init__(self):
         self._ui = Widgets()

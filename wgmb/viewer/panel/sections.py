@@ -1,4 +1,4 @@
-"""The panel's sections: what is seen, how it is blurred, how it is shown."""
+"""The panel's sections: the subject, its blur and its display."""
 
 from __future__ import annotations
 

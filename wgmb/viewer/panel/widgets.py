@@ -42,7 +42,7 @@ class Widgets:
             imgui.end_tooltip()
 
     def label(self, text: str) -> None:
-        """The word; what comes next is beside it."""
+        """The word; the next widget is beside it."""
         imgui.align_text_to_frame_padding()
         imgui.text(text)
         imgui.same_line(_LABEL)

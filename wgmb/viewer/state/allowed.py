@@ -1,4 +1,4 @@
-"""Options that do not fit what is shown: each is refused in one line, none is ignored."""
+"""Options that do not fit the subject: each is refused in one line, none is ignored."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def check_options(state: ShownMoment, named: Collection[str]) -> None:
 
 
 def check_video(state: ShownMoment) -> None:
-    """InputError if the state of a video holds what only rendered frames have."""
+    """InputError if the state of a video has settings of rendered frames."""
     for name in (*changed("input", state.input), *changed("blur", state.blur)):
         _check_layers(name)
 

@@ -1,6 +1,6 @@
 """Facts of files that a State depends on: frames there are, and the times of a video's pictures.
 
-Each file is read once, and again when it has changed. One that has vanished is what it was.
+Each file is read once, and again when it has changed. One that has vanished counts as unchanged.
 """
 
 from __future__ import annotations

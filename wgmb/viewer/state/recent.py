@@ -21,7 +21,7 @@ class RecentFiles:
         self.sources = _read(path)
 
     def add(self, source: str) -> None:
-        """Note a file or pattern that is shown; what cannot be written is left out."""
+        """Note a file or pattern that is shown; names that cannot be written are left out."""
         whole = os.path.abspath(source)
         if self.sources[:1] == [whole]:
             return

@@ -120,7 +120,7 @@ class State(ShownMoment):
 
     @property
     def picture(self) -> State:
-        """The same without what only changes how the picture is shown."""
+        """The same without settings of the display alone."""
         plain = State()
         same = replace(self, **{name: getattr(plain, name) for name in _SHOWING})
         same = replace(same, color=self.read_as)
@@ -138,7 +138,7 @@ class State(ShownMoment):
 
     @property
     def is_compared_with_kept(self) -> bool:
-        """True if settings B are what the picture is compared with."""
+        """True if the picture is compared with settings B."""
         return bool(self.kept) and self.against == KEPT and self.compare != "off"
 
     def differences(self, other: State) -> list[str]:
@@ -177,7 +177,7 @@ class State(ShownMoment):
 
     @property
     def moment(self) -> float:
-        """The moment at which it is looked at what is perceived [frame intervals].
+        """The moment of the perceived picture [frame intervals].
 
         Frames and videos that stand still are looked at in the middle of a frame's time.
         """
@@ -187,7 +187,7 @@ class State(ShownMoment):
 
     @property
     def read_as(self) -> ColorSettings:
-        """Of `color` what changes how files are read, not only how they are shown."""
+        """The settings of `color` that change how files are read, not only how they are shown."""
         color = self.color
         return ColorSettings(from_=color.from_, ocio=color.ocio if color.from_ else None)
 
@@ -336,7 +336,7 @@ class State(ShownMoment):
 
     @staticmethod
     def read(path: Path) -> State:
-        """The state that was saved in a file; `InputError` names the file and what is wrong."""
+        """The state that was saved in a file; `InputError` names the file and the fault."""
         with about(path):
             return State.of_toml(text_of(path))
 

@@ -24,7 +24,7 @@ _OF_SCENES = frozenset(name for name, group in GROUP_OF.items() if group == "sce
 
 
 def toml(tables: dict[str, dict[str, object]]) -> str:
-    """The tables as text; what is None is left out."""
+    """The tables as text; None is left out."""
     return "\n".join(
         f"[{name}]\n" + "".join(_line(k.rstrip("_"), v) for k, v in table.items())
         for name, table in tables.items()
@@ -52,7 +52,7 @@ def tables(text: str) -> dict[str, dict]:
 
 
 def values(table: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool) -> dict:
-    """Fields of the State `plain`, changed to what [render], or [blur], and [view] hold."""
+    """Fields of the State `plain`, changed to those of [render], or [blur], and [view]."""
     known = {"fps": str | float}
     for group in GROUPS.values():
         known |= typing.get_type_hints(group)

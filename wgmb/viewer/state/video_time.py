@@ -1,4 +1,4 @@
-"""The time of what is shown: the output frames of a video, and how they pass."""
+"""The time shown: the output frames of a video, and how they pass."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Motion of a video's pictures, made in a thread of its own while the window goes on.
 
-The thread has a device and a reader of its own, so that the window never waits for it. What it
-has found of a picture is kept, as far as memory allows.
+The thread has a device and a reader of its own, so that the window never waits for it. Its
+findings about a picture are kept, as far as memory allows.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _POLL = 0.2  # seconds after which the thread looks whether it should end
 class MotionThread:
     """Makes the motion of the pictures that are wanted, the first of them first.
 
-    What is static is found before the first motion. `how`: where motion comes from, in words.
+    Static areas are found before the first motion. `how`: where motion comes from, in words.
     `problem`: why there will be no more.
     """
 
@@ -63,7 +63,7 @@ class MotionThread:
             return self._known.get(number)
 
     def want(self, numbers: tuple[int, ...]) -> None:
-        """Make these next, in this order, instead of what was wanted before."""
+        """Make these next, in this order, instead of earlier requests."""
         with self._lock:
             if numbers != self._wanted:
                 self._wanted = numbers
@@ -76,7 +76,7 @@ class MotionThread:
             return self._making and (self._making[0], time.perf_counter() - self._making[1])
 
     def close(self) -> None:
-        """Let the thread end with what it is doing."""
+        """Let the thread end after its current work."""
         self._ended.set()
         self._changed.set()
 

@@ -99,7 +99,7 @@ class SceneSubject:
         return self._held
 
     def passes(self) -> dict[str, Texture]:
-        """The sharp picture and what lies under it, by name."""
+        """The sharp picture and its layers, by name."""
         return self._render.passes(self._time, self._number)
 
     def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Clock | None) -> int:
@@ -115,7 +115,7 @@ class SceneSubject:
 
 @dataclass
 class _Uploads:
-    """A set of textures, and what is in them."""
+    """A set of textures, and their contents."""
 
     residency: Residency
     which: _Which | None = None
@@ -125,7 +125,7 @@ class _Uploads:
 class ClipSubject:
     """Frames on disk: their own size, their own moments, the methods they have passes for.
 
-    `finding`: what their vectors mean; to find that out takes longer than to read a frame.
+    `finding`: the convention of their vectors; the test takes longer than reading a frame.
     """
 
     def __init__(self, device: wgpu.GPUDevice, state: State, display: Display | None):
@@ -265,7 +265,7 @@ class ClipSubject:
         return dict(kept.inputs)
 
     def passes(self) -> dict[str, Texture]:
-        """The sharp picture and what lies under it, by name; only what there is."""
+        """The sharp picture and its layers, by name; only those that exist."""
         frame, images = self._frame(self._now), self._images
         inputs = self._inputs(self._sharp)
         color, depth, motion_ = (f"{name} {self._now[1]}" for name in ("color", "depth", "motion"))
@@ -330,5 +330,5 @@ Subject = SceneSubject | ClipSubject | VideoSubject
 
 
 def methods_for(has: frozenset[str]) -> list[str]:
-    """The methods that can be fed with what there is."""
+    """The methods for which all inputs exist."""
     return [name for name, method in METHODS.items() if method.needs <= has]

@@ -41,7 +41,7 @@ class VideoSubject:
     """A video: its output frames, as `wgmb blur` makes them.
 
     Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
-    when more is known. `finding`: where motion comes from, and what is odd about the file.
+    when more is known. `finding`: the source of motion, and peculiarities of the file.
     """
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
@@ -102,8 +102,8 @@ class VideoSubject:
     def stamp(self, states: Sequence[State], shutter: Shutter, neighbours: bool) -> list[tuple]:
         """Findings about the pictures that contribute to the output frames, one entry for each.
 
-        What lacks is asked for, that of the first output frame first, and while playing also that
-        of the pictures to come.
+        Missing motion is requested, that of the first output frame first, and while playing also
+        that of the pictures to come.
         """
         beside = 1 if neighbours and self._moves else 0
         known = lru_cache(maxsize=None)(self._maker.known)  # the same throughout: a thread adds
@@ -127,7 +127,7 @@ class VideoSubject:
 
     @property
     def busy(self) -> bool:
-        """True while what is shown lacks motion that is being made."""
+        """True while motion of the picture shown is being made."""
         return bool(self._lacking) and not self._maker.problem
 
     @property
@@ -186,7 +186,7 @@ class VideoSubject:
         self._exposed = self._exposure(state, Shutter(0))
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
-        """The sharp picture and what lies under it; 0 everywhere as long as it is not known."""
+        """The sharp picture and its layers; 0 everywhere as long as they are unknown."""
         assert self._exposed is not None
         frame, images = self._frames(self._exposed.here), self._images
         width, height = frame.size
@@ -243,7 +243,7 @@ class VideoSubject:
     def _change_light(
         self, cells: Sequence[Cell], exposed: wgpu.GPUTexture, output: wgpu.GPUTexture
     ) -> None:
-        """Add what light changes in the pictures of these cells to the exposure."""
+        """Add changes of light in the pictures of these cells to the exposure."""
         for cell in cells:
             indices, factors = self._frames.surroundings(cell.index)
             frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))

@@ -34,7 +34,7 @@ class VideoExposure:
 def exposure_of(
     times: Times, clock: Clock, frame: OutputFrame, shutter: Shutter, known: Knowledge
 ) -> VideoExposure:
-    """The exposure of an output frame; where too little is known, of what is known."""
+    """The exposure of an output frame; where motion is missing, of the pictures that have it."""
     shown = picture_at(times, clock, frame)
     here, lacking = _kept(shown, known)
 

@@ -1,4 +1,4 @@
-"""Frames of a video's pictures, with what is known of their motion; the last ones are kept."""
+"""Frames of a video's pictures, with their motion as far as it is known; the last ones are kept."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class PictureFrames:
     def surroundings(
         self, number: int
     ) -> tuple[tuple[int | None, int, int | None], tuple[float, float]]:
-        """Numbers of a picture and those that its motion leads to, and what `evened` its motion."""
+        """Numbers of a picture, of those its motion leads to, and of those that `evened` it."""
         known = self._known(number)
         if known is None:
             return (None, number, None), (1.0, 1.0)

@@ -52,7 +52,7 @@ class PictureFinding:
 class MotionRequest:
     """Settings on which the pictures' neighbours depend, besides the source of the motion.
 
-    `masks`: what stays sharp (see video/holdouts.py). `fill`: repeated pictures are left out.
+    `masks`: areas that stay sharp (see video/holdouts.py). `fill`: repeated pictures are left out.
     `cuts`: see shots/cut_list.py.
     """
 
@@ -62,7 +62,7 @@ class MotionRequest:
 
 
 class PictureFinder:
-    """Finds what can be known of pictures, one after the other, on a device."""
+    """Finds motion and other data of pictures, one after the other, on a device."""
 
     def __init__(
         self,
@@ -110,7 +110,7 @@ class PictureFinder:
         )
 
     def close(self) -> None:
-        """Let go of the pictures: what reads them refers back to this, and they are large."""
+        """Let go of the pictures: their reader refers back to this, and they are large."""
         if self._motion is not None:
             self._motion.close()
         self._shots = self._motion = self._held = None

@@ -1,1 +1,1 @@
-"""Layers: silhouettes as a surface and what is behind it, in the light of the frame."""
+"""Layers: silhouettes as a surface and its background, in the light of the frame."""

@@ -182,7 +182,7 @@ class Layers:
     def _relit(
         self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, cells: gpu.BufferPart
     ) -> None:
-        """Record that the neighbours get the light of the frame where it hides what they show."""
+        """Record that the neighbours get the light of the frame on surfaces that it hides."""
         for slot, frame in enumerate(inputs.frames):
             if abs(frame.offset) == 1:
                 surfaces = self.front_surface(0), self.front_surface(slot)

@@ -1,4 +1,4 @@
-"""The light of a neighbour made that of the frame, where the frame hides what it is taken for."""
+"""Relights pixels borrowed from a neighbouring frame, where the frame hides the surface."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..tiles.active_tiles import grid_of
 
 
 class Relight:
-    """Corrects the front layer of a neighbour by the ratio of light beside what is hidden."""
+    """Corrects the front layer of a neighbour by the ratio of light beside the hidden surface."""
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device = device

@@ -22,7 +22,7 @@ class SurfaceLight:
 def screen(stage: Stage, frames: Mapping[int, SurfaceLight], scale: int) -> None:
     """Record in which tiles light may differ in a neighbour; `frames` as those of `changes`.
 
-    Of what rests, a pixel of the `stage` is `scale` pixels of the frames wide.
+    On static surfaces, a pixel of the `stage` is `scale` pixels of the frames wide.
     """
     for offset, other in frames.items():
         if not offset:

@@ -1,4 +1,4 @@
-"""Flow between two pictures of what moves over surfaces, both ways, and how far it is trusted."""
+"""Flow of light over surfaces between two pictures, both ways, and how far it is trusted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SPREAD, GUARD = 5.0, 4.0  # [px] sigma of the fill, and of where motion has to e
 
 @dataclass(frozen=True)
 class LightFlow:
-    """Flow from the frame to a neighbour and back [px], with trust; of shadows, what it tells."""
+    """Flow from the frame to a neighbour and back [px], with trust; for shadows, their findings."""
 
     ahead: View
     back: View
@@ -206,7 +206,7 @@ def half_size(size: Size) -> Size:
 
 
 def _filled(stage: Stage, name: str, flow: View, back: View, bindings: dict[str, Any]) -> View:
-    """Flow in which that around it stands for what is not trusted; `bindings`: all others."""
+    """Flow in which untrusted places take that of their surroundings; `bindings`: all others."""
     result = stage.sparse(f"filled {name}", "rgba16float")
     weighted = stage.sparse("weighted", "rgba32float")
     around = stage.sparse("around", "rgba32float", half_size(stage.size))

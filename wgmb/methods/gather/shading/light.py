@@ -267,7 +267,7 @@ def _carry(stage: Stage, darkness: View, ways: Mapping[int, LightFlow], times: L
 
 
 def scale_of(size: tuple[int, int]) -> int:
-    """Side of the squares of an image that stand for a pixel of light on what rests [px]."""
+    """Side of the squares of an image that share a pixel of light on static surfaces [px]."""
     scale = 2
     while max(size) > scale * LONGEST:
         scale *= 2

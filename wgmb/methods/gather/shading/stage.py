@@ -77,8 +77,8 @@ class Stage:
         """Record one entry point over `size` invocations, over a list of tiles, or over the image.
 
         `halved`: over the tiles of an image of half the frame's size or less. The textures of
-        another size than the frame's come with their own. What the stage has for all passes (its
-        lists, flags and kind of light) is bound where a file declares it.
+        another size than the frame's come with their own. The resources of the stage for all passes
+        (its lists, flags and kind of light) are bound where a file declares them.
         """
         path = f"{FOLDER}/{file}.wgsl"
         source = wgsl.load(path)

@@ -16,7 +16,7 @@ def values(
 ) -> dict[int, View]:
     """Darkness, or levels of light, by the offset of the frame: see values.wgsl.
 
-    `by_color`: the light is the picture itself, and what is brightest around may be its texture.
+    `by_color`: the light is the picture itself, and the brightest pixels around may be its texture.
     """
     sides: dict[str, Any] = {"before": changed.get(-1), "after": changed.get(1)}
     closed = None
