@@ -1,4 +1,4 @@
-"""Make docs/laboratory/fine-scenes.md and its pictures: python tools/fine_figures.py
+"""Make the fine scenes of docs/laboratory/scores.md: python tools/fine_figures.py
 
 The scenes are those on which tests/methods/test_never_behind.py compares `gather` with the
 simpler methods: fine structure, leaves, soft edges, and the first scene that everybody makes.
@@ -12,12 +12,12 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "made"))
 
 import fine_scenes
+import scores_page
 
-from pictures import IMAGES, enlarged, grid, levels, save
+from pictures import enlarged, grid, levels, save
 from wgmb import Blur, gpu, metrics
 from wgmb.lab.results import machine
 
-PAGE = IMAGES.parent / "laboratory" / "fine-scenes.md"
 METHODS = ("tap", "tiles", "reproject", "gather")
 DEGREES, SHOWN = (90, 180, 360), 180
 ABOUT = {
@@ -39,10 +39,10 @@ CROPS = {  # corner and size [px] of what is shown
 
 
 def main() -> None:
-    """Score every scene at every shutter, and write the page."""
+    """Score every scene at every shutter, and write them into the page."""
     device = gpu.open_device()
     blurs = {name: Blur(name, samples=16, device=device) for name in METHODS}
-    lines, sections = [["scene", "sharp", *METHODS], ["---"] * (2 + len(METHODS))], []
+    lines, sections = [["scene", "sharp", *METHODS]], []
     for name in fine_scenes.NAMES:
         frame = fine_scenes.sharp(name)
         for degrees in DEGREES:
@@ -55,7 +55,7 @@ def main() -> None:
             print("  ".join(lines[-1]), flush=True)
             if degrees == SHOWN:
                 sections.append(section(name, truth, made))
-    PAGE.write_text(text(device, lines, sections), encoding="utf-8")
+    scores_page.write("fine scenes", text(device, lines, sections))
 
 
 def cell(got: np.ndarray, truth: np.ndarray) -> str:
@@ -80,29 +80,23 @@ def section(name: str, truth: np.ndarray, made: dict[str, np.ndarray]) -> str:
         pictures[f"{metrics.FLIP_GAIN:g} x FLIP of {method}"] = part(error)
     save(grid(pictures, 3), f"fine/{name}.png")
     return (
-        f"## {name}\n\n{ABOUT[name]}\n\n![truth, {first}, {second}, the frame, errors]"
+        f"### {name}\n\n{ABOUT[name]}\n\n![truth, {first}, {second}, the frame, errors]"
         f"(../images/fine/{name}.png)\n"
     )
 
 
 def text(device, lines: list[list[str]], sections: list[str]) -> str:
-    """The text of the page."""
+    """The text on fine scenes."""
     about = ", ".join(f"{k} {v}" for k, v in machine(device).items())
     return (
-        "# Fine scenes\n\n"
         "On these small scenes a simple method may be as good as a clever one. wgmb renders them "
         "at 160 x 90 pixels, with vectors that are not filtered at edges; the truth is "
-        "`distributed` with 256 samples, of `soft_disk` the mean of 128 instants. Each cell shows "
-        "FLIP (lower is better) / PSNR on the display in dB (higher is better), for 16 samples "
-        "and box shutters centred on the frame.[^made]\n\n"
-        + "".join(f"| {' | '.join(line)} |\n" for line in lines)
-        + "\n`tests/methods/test_never_behind.py` holds `gather` to the best of the others there "
-        "and on the built-in scenes, and lists where it is behind and by how much.\n\n"
-        "`python tools/fine_figures.py` writes this page. The pictures are crops at "
-        f"{SHOWN}°, enlarged: the truth, `gather` and the method with the least FLIP of the "
-        "others; below them, the frame and the errors.\n\n"
-        + "\n".join(sections)
-        + f"\n[^made]: {about}.\n"
+        "`distributed` with 256 samples, of `soft_disk` the mean of 128 instants. All methods have "
+        "16 samples.\n\n"
+        + scores_page.table(lines)
+        + f"\nMade with {about}.\n\nThe pictures are crops at {SHOWN}°, enlarged: the truth, "
+        "`gather` and the method with the least FLIP of the others; below them, the frame and the "
+        "errors.\n\n" + "\n".join(sections)
     )
 
 

@@ -1,19 +1,20 @@
-"""Make the gallery: python tools/gallery.py. Every picture and figure comes from the program.
+"""Compare all methods: python tools/gallery.py. Every picture and figure comes from the program.
 
-Every method draws every scene; the page shows its picture of the first, its error map, and
-the place of all scenes where it is worst, beside the truth.
+Every method draws every scene. The table is a part of docs/laboratory/scores.md; the picture on the
+page of a method shows the first scene, its error map, and the place of all scenes where it is
+worst, beside the truth.
 
 python tools/gallery.py REPORT.json... instead puts tables of `wgmb compare --experiment` into
 experiments.md, between <!-- TITLE OF THE TABLE --> and <!-- -->.
 """
 
-import inspect
 import json
 import re
 import sys
 from pathlib import Path
 
 import numpy as np
+import scores_page
 from PIL import Image
 
 from wgmb import METHODS, gpu
@@ -25,12 +26,7 @@ from wgmb.lab.cases import (
 )
 from wgmb.lab.compare import Laboratory
 from wgmb.lab.results import Entry, Report, machine
-from wgmb.metrics import (
-    FLIP_GAIN,
-    METRICS,
-    display,
-    flip_colors,
-)
+from wgmb.metrics import display, flip_colors
 from wgmb.settings import ShutterSettings
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -41,7 +37,7 @@ REFERENCE, SAMPLES, RAYS = "distributed:512", 16, 4
 
 
 def main() -> None:
-    """Render, judge and write gallery.md with its pictures."""
+    """Render, judge, and write the table and the pictures."""
     device = gpu.open_device()
     lab = Laboratory(device, tell=lambda text: print(text, file=sys.stderr))
     found = Report("Gallery", "python tools/gallery.py", machine(device), SAMPLES)
@@ -57,7 +53,9 @@ def main() -> None:
         able = candidates if scene.bodies else [c for c in candidates if c.needs_scene]
         lab.compare(found, case, able, (SAMPLES,), budgets=lambda *_: [])
     (DOCS / "images" / "gallery").mkdir(parents=True, exist_ok=True)
-    (DOCS / "laboratory" / "gallery.md").write_text(_page(found), encoding="utf-8")
+    for name in METHODS:
+        _draw(found, name)
+    scores_page.write("side by side", _text(found))
 
 
 def fill(text: str, reports: list[dict]) -> str:
@@ -75,26 +73,20 @@ def fill(text: str, reports: list[dict]) -> str:
     return re.sub(r"<!-- (.+?) -->\n(?:\|.*\n)*<!-- -->", filled, text)
 
 
-def _page(found: Report) -> str:
+def _text(found: Report) -> str:
     about = ", ".join(f"{k} {v}" for k, v in found.machine.items())
-    sections = [_section(found, name) for name in METHODS]
     return (
-        "# The methods, side by side\n\n"
-        f"FLIP (lower is better) of every method on four built-in scenes of {SIZE[0]} x {SIZE[1]} "
-        f"with {SAMPLES} samples. The truth is {REFERENCE.replace(':', ' with ')} rays per pixel. "
-        "Times are those of the blur alone, on a CPU.[^made] `wgmb compare` makes such a page for "
-        "your frames.\n\n" + _table(found) + "\nEach picture has four parts. Top: the method's "
-        f"picture of the first scene, and its error ({FLIP_GAIN:g} times FLIP; black is no error). "
-        "Bottom: the place of all scenes where the method is worst, and the truth there.\n\n"
-        + "\n".join(sections)
-        + f"\n[^made]: Made by `{found.command}`: {about}.\n"
+        f"FLIP of every method on four built-in scenes of {SIZE[0]} x {SIZE[1]} with {SAMPLES} "
+        f"samples. The truth is {REFERENCE.replace(':', ' with ')} rays per pixel. Times are "
+        "of the blur alone, on a CPU. The page of each method shows its error and its worst "
+        "place.\n\n" + _table(found) + f"\nMade with {about}.\n"
     )
 
 
 def _table(found: Report) -> str:
     """FLIP by method and scene, and the time of the first scene."""
     head = ["method", *(c.name for c in found.cases), "PSNR [dB], first", "ms", "times `tap`"]
-    lines = [head, ["---"] * len(head)]
+    lines = [head]
     for label in ("sharp", *METHODS):
         row, first = [f"`{label}`"], None
         for case in found.cases:
@@ -104,7 +96,7 @@ def _table(found: Report) -> str:
             first = first or next(iter(entries), None)
         row += [f"{first.measures['psnr']:.1f}", _time(first), _times_tap(found, first)]
         lines.append(row)
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return scores_page.table(lines)
 
 
 def _time(entry: Entry) -> str:
@@ -120,7 +112,8 @@ def _times_tap(found: Report, entry: Entry) -> str:
     return f"{ratio:.1f}"
 
 
-def _section(found: Report, name: str) -> str:
+def _draw(found: Report, name: str) -> None:
+    """Write the picture of a method."""
     entries = [e for e in found.entries if e.label == name]
     cases = {c.name: c for c in found.cases}
     picture = DOCS / "images" / "gallery" / f"{name}.jpg"
@@ -134,25 +127,6 @@ def _section(found: Report, name: str) -> str:
     strip = np.vstack([np.hstack(shown[:2]), np.hstack(shown[2:])])
     levels = (255 * np.clip(strip, 0, 1) + 0.5).astype(np.uint8)
     Image.fromarray(levels).save(picture, quality=82, optimize=True)
-    first, strong, artefacts = _words(METHODS[name])
-    figures = ", ".join(
-        f"{m.title} {entries[0].measures[k]:.{m.digits}f}" for k, m in METRICS.items()
-    )
-    return (
-        f"## {name}\n\n{first}\n\n- Strong: {strong}\n- Artefacts: {artefacts}\n"
-        f"- {entries[0].case}: {figures}\n\n"
-        f"![{name}: picture, error, worst place ({entries[worst].case}), truth there]"
-        f"(../images/gallery/{name}.jpg)\n"
-    )
-
-
-def _words(method: type) -> tuple[str, str, str]:
-    """The first line of a method's docstring, and what it says of strength and artefacts."""
-    text = " ".join(inspect.cleandoc(method.__doc__ or "").split())
-    strong = re.search(r"Strong: (.*?)(?= Artefacts:|$)", text)
-    artefacts = re.search(r"Artefacts: (.*)$", text)
-    assert strong and artefacts, f"{method.__name__} does not say its strength and artefacts"
-    return inspect.cleandoc(method.__doc__ or "").splitlines()[0], strong[1], artefacts[1]
 
 
 def _worst(error: np.ndarray) -> tuple[float, tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""Memory does not grow with the frames, whatever method, variant or scene (see lavapipe.md)."""
+"""Memory does not grow with the frames, whatever method, variant or scene (see wgsl.md)."""
 
 import ctypes
 from dataclasses import replace

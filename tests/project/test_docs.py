@@ -1,9 +1,11 @@
 """The examples of the documentation work: Python, command lines, options, links."""
 
+import csv
 import gc
 import re
 import shlex
 import tomllib
+from datetime import date
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -182,6 +184,39 @@ def test_the_table_of_extras_has_them_all():
 def test_the_list_of_the_api_has_every_exported_name():
     listed = re.findall(r"`(\w+)(?:\.\w+)?`", PAGES["docs/python/api.md"])
     assert sorted(set(wgmb.__all__) - {*listed}) == []
+
+
+DECISIONS = (HERE / "docs/laboratory/decisions.csv").read_text("utf-8").splitlines()
+COLUMNS = ("date", "rule", "constant", "scenes", "before", "after")
+
+
+def defined(constant: str) -> bool:
+    """True if `FILE:NAME` is a constant or function at the top of that file."""
+    path, _, name = constant.partition(":")
+    file = HERE / path
+    begins = rf"^(?:(?:const|override|fn|def|class) +)?{re.escape(name)}\b *[:=(]"
+    return file.is_file() and re.search(begins, file.read_text("utf-8"), re.M) is not None
+
+
+@pytest.mark.fast
+def test_every_decision_is_complete_and_its_constant_is_in_the_code():
+    """A row goes when its rule goes; docs/laboratory/conclusions.md explains the columns."""
+    rows = [*csv.DictReader(DECISIONS, strict=True)]
+    assert tuple(rows[0]) == COLUMNS and len(rows) > 60
+    for row in rows:
+        assert all((row[name] or "").strip() for name in COLUMNS) and len(row) == len(COLUMNS), row
+        assert date.fromisoformat(row["date"])
+        assert row["before"] != row["after"], row
+        assert all(re.search(r"\d", row[name]) for name in ("before", "after")), row
+        assert defined(row["constant"]), row["constant"]
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("name", ["NEVER", "GOES", "is_hidden_at_all"])
+def test_a_constant_that_is_gone_is_noticed(name):
+    path = "wgsl/methods/gather/search/visibility.wgsl"
+    assert defined(f"{path}:GOES_ON") and not defined(f"{path}:{name}")
+    assert not defined(f"wgsl/none.wgsl:{name}")
 
 
 WRITING = re.compile(r"^wgmb .* -o ('[^']*'|\S+)", re.M)

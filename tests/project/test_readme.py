@@ -36,7 +36,7 @@ SCORED = {
 def test_the_scores_are_those_of_the_page_of_scores(page):
     rows = re.findall(r"^\| (.*) \|$", (HERE / page).read_text(encoding="utf-8"), re.M)
     told = {row.split(" | ")[0]: row.split(" | ")[1:] for row in rows}
-    scores = (HERE / "docs/laboratory/blender-scores.md").read_text(encoding="utf-8")
+    scores = (HERE / "docs/laboratory/scores.md").read_text(encoding="utf-8")
     table = [line.strip("| ").split(" | ") for line in scores.splitlines() if line[:1] == "|"]
     columns = [table[0].index(name) for name in ("sharp", "tap 16", "reproject 16", "gather 16")]
     for name, scene in SCORED.items():
