@@ -1,4 +1,4 @@
-// What the frames before and after a frame tell about the paths of its surfaces. Where there is no such neighbour its textures
+// Evidence of the frames before and after a frame about the paths of its surfaces. Where there is no such neighbour its textures
 // are empty: their depth is 0.
 //#include common/depth.wgsl
 //#include common/frame.wgsl

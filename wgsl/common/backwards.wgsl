@@ -4,7 +4,7 @@
 
 const ASIDE: f32 = 0.25;        // frame intervals along its own path, to either side, at which the velocity around a pixel is read
 
-/// Displacement from a pixel to what it shows at time `t`, as a trajectory. What is at y moves to x = y + v(y) t + a(y) t^2, so that
+/// Displacement from a pixel to the point it shows at time `t`, as a trajectory. A point at y moves to x = y + v(y) t + a(y) t^2, so that
 /// y = x - v t + (J v - a) t^2 to second order, where J v is the change of the velocity along itself: none in a translation, twice
 /// the half acceleration a in a turn. At an edge of the motion it is a step, and counts up to the velocity itself.
 fn backwards(motion: texture_2d<f32>, trajectory: Trajectory, x: vec2f) -> Trajectory {

@@ -5,7 +5,7 @@ struct Trajectory {             // position(t) = position(0) + velocity t + half
     half_acceleration: vec2f,   // [px per squared frame interval]
 }
 
-const STATIC_EPSILON: f32 = 0.01;   // what is displaced by less than this [px] does not move
+const STATIC_EPSILON: f32 = 0.01;   // displacements below this [px] count as none
 
 /// The parabola through the three positions; a line where `motion` = (to_prev, to_next) [px] are opposite.
 fn trajectory_from(motion: vec4f) -> Trajectory {

@@ -31,7 +31,7 @@ fn exposure_window(offset: f32) -> vec2f {
     return shutter.span + vec2f(-late, late) - offset;
 }
 
-struct SampleTimes {        // what the sample times of a pixel have in common, fetched once before its loop
+struct SampleTimes {        // common to all sample times of a pixel, fetched once before its loop
     count: u32,
     first: f32,             // of a box shutter [frame intervals]
     step: f32,              // of a box shutter [frame intervals]

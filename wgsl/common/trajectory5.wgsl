@@ -3,7 +3,7 @@
 //#include common/path.wgsl
 
 const MOST_CHANGE: f32 = 3.0;           // of a half acceleration from one frame to the next, as a ratio
-const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: what changes more is another surface, or noise
+const SPARED_CHANGE: f32 = 2.0;         // and this much more [px]: a larger change is another surface, or noise
 const KINK_ACCELERATION: f32 = 1.0;     // from this half acceleration on [px] a path may have a kink,
 const KINK_RATIO: f32 = 0.15;           // if those before and after it are smaller by this
 const LEAST_TURNED: f32 = 1.0;          // half acceleration [px] from which on turns are told

@@ -1,5 +1,5 @@
 // Transfer functions of videos (ITU-T H.273), both ways. Light of 1 is the white of text and paper; values below 0
-// and above 1 go through, so that what is stored comes back as it was.
+// and above 1 go through, so that stored values come back unchanged.
 
 const CURVE_SRGB: u32 = 13u;    // also of BT.709, BT.601 and BT.2020: pictures are graded on displays about like it
 const CURVE_GAMMA22: u32 = 4u;

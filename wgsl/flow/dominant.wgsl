@@ -12,7 +12,7 @@ struct Dominant {
 @group(1) @binding(6) var states: texture_2d_array<f32>;
 @group(1) @binding(7) var output: StatesOut;
 
-const SAME_WAY: f32 = 1.0;      // what moves so much like most of the picture on one side [px] does so on the other
+const SAME_WAY: f32 = 1.0;      // a pixel that moves so much like most of the picture on one side [px] does so on the other
                                 // too, rather than being hidden there
 
 const UNSEEN_PRICE: f32 = 0.06; // for leaving the picture on both sides as most of it does

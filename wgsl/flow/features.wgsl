@@ -5,7 +5,7 @@ const LUMA: vec3f = vec3f(0.299, 0.587, 0.114);     // ITU-R BT.601
 const DIRECTION_SCALE: f32 = 0.25;      // directions are stored this many times too large, inverted
 const LIKENESS: f32 = 300.0;            // how fast the weight falls with the difference of display colours
 const LEAST_WEIGHT: f32 = 0.02;         // of a pixel unlike the centre
-const SHADE_WEIGHT: f32 = 0.25;         // of what may be a change of the light
+const SHADE_WEIGHT: f32 = 0.25;         // of possible changes of light
 
 /// Difference of two pixels: the sum of absolute differences of their 7 features.
 fn difference(a0: vec4f, a1: vec3f, b0: vec4f, b1: vec3f) -> f32 {
@@ -25,7 +25,7 @@ fn likeness(a: vec3f, b: vec3f) -> f32 {
     return 1.0 / (1.0 + LIKENESS * d * d) + LEAST_WEIGHT;
 }
 
-/// What flow sees of a linear colour: 0 to 1.
+/// The value of a linear colour for flow: 0 to 1.
 fn limited(color: vec4f) -> vec4f {
     return vec4f(select(vec3f(0.0), clamp(color.rgb, vec3f(0.0), vec3f(1.0)), is_color(vec4f(color.rgb, 0.0))), 1.0);
 }

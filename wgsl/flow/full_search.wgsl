@@ -25,7 +25,7 @@ struct Best {           // u, v, cost
 const COLUMNS: i32 = 9;             // lavapipe ends loops after 65,535 turns
 override BLOCK: i32 = 2;            // pixels along a block
 const LENGTH_PRICE: f32 = 0.0025;   // per px of displacement: of those that match much alike, the shortest
-const PAIR_PRICE: f32 = 0.015;      // for two displacements in place of one, besides what the bend costs
+const PAIR_PRICE: f32 = 0.015;      // for two displacements in place of one, besides the cost of the bend
 
 fn cheaper(found: vec4f, by: vec2f, cost: f32) -> vec4f {
     return select(found, vec4f(by, cost, 0.0), cost < found.z);

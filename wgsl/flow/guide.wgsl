@@ -1,4 +1,4 @@
-// From coarse to fine: the smooth motion that a picture seems to have from afar, where what repeats on it is too small
+// From coarse to fine: the smooth motion that a picture seems to have from afar, where repeating texture is too small
 // to be seen. A displacement to the near frame and one to the far frame for each pixel.
 //#include common/loops.wgsl
 //#include flow/band.wgsl

@@ -13,7 +13,7 @@ struct Others {         // how the states of the two other frames lead back to t
 @group(1) @binding(6) var states: texture_2d_array<f32>;
 @group(1) @binding(7) var near_states: texture_2d_array<f32>;
 @group(1) @binding(8) var far_states: texture_2d_array<f32>;
-@group(1) @binding(9) var lost: texture_2d<u32>;        // what `find_lost` wrote: 1 if a pixel is not found again
+@group(1) @binding(9) var lost: texture_2d<u32>;        // output of `find_lost`: 1 if a pixel is not found again
 @group(1) @binding(10) var lost_out: texture_storage_2d<r32uint, write>;
 @group(1) @binding(11) var output: StatesOut;
 
@@ -27,7 +27,7 @@ const EIGHTH: f32 = 0.785398;       // of a turn [rad]
 const UNLIKE_PRICE: f32 = 0.2;      // per difference of display colours,
 const MOST_UNLIKE: f32 = 0.5;       // which counts up to this
 const FAR_PRICE: f32 = 0.001;       // per px of distance
-const MOST_COST: f32 = 0.15;        // of the match: what is hidden matches nowhere
+const MOST_COST: f32 = 0.15;        // of the match: hidden pixels match nowhere
 
 /// Where the way to another frame and back ends, from where it began [px].
 fn missed(px: vec2i, flow: vec2f, other: texture_2d_array<f32>, side: f32) -> f32 {

@@ -14,8 +14,8 @@ struct Result {
 
 @group(1) @binding(0) var<uniform> result: Result;
 @group(1) @binding(1) var states: texture_2d_array<f32>;
-@group(1) @binding(2) var motion: texture_2d<f32>;      // what `write_motion` wrote
-@group(1) @binding(3) var apart: texture_2d<f32>;       // what `find_apart` wrote
+@group(1) @binding(2) var motion: texture_2d<f32>;      // output of `write_motion`
+@group(1) @binding(3) var apart: texture_2d<f32>;       // output of `find_apart`
 @group(1) @binding(4) var motion_out: texture_storage_2d<rgba32float, write>;  // to_prev, to_next [px]
 @group(1) @binding(5) var apart_out: texture_storage_2d<rgba32float, write>;   // distance of both [px]
 @group(1) @binding(6) var depth_out: texture_storage_2d<r32float, write>;      // of no scale: smaller is nearer

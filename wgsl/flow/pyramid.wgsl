@@ -4,8 +4,8 @@
 //#include common/frame.wgsl
 //#include flow/features.wgsl
 
-@group(1) @binding(0) var picture: texture_2d<f32>;     // of each pass: what the one before wrote
-@group(1) @binding(1) var display: texture_2d<f32>;     // what `encode_display` wrote
+@group(1) @binding(0) var picture: texture_2d<f32>;     // of each pass: the output of the one before
+@group(1) @binding(1) var display: texture_2d<f32>;     // output of `encode_display`
 @group(1) @binding(2) var output: Output;
 @group(1) @binding(3) var features: Features;           // see write_features()
 
@@ -17,7 +17,7 @@ const SPREAD_FALLOFF: f32 = 0.125;      // 1 / (2 sigma^2), sigma = 2 px
 const FAINT: f32 = 0.03;                // gradients weaker than this have little direction
 const DIRECTION_WEIGHT: f32 = 0.05;     // of the direction among the features
 
-/// Level 0: what flow sees of a picture, 0 to 1.
+/// Level 0: the values of a picture for flow, 0 to 1.
 @compute @workgroup_size(WG_X, WG_Y)
 fn limit(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }

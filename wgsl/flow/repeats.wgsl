@@ -8,7 +8,7 @@
 @group(1) @binding(6) var guide: texture_2d_array<f32>;         // displacements of this frame,
 @group(1) @binding(7) var near_back: texture_2d_array<f32>;     // of the near frame to this one,
 @group(1) @binding(8) var far_back: texture_2d_array<f32>;      // and of the far one
-@group(1) @binding(9) var found: texture_2d<u32>;               // what `find` wrote
+@group(1) @binding(9) var found: texture_2d<u32>;               // output of `find`
 @group(1) @binding(10) var found_out: texture_storage_2d<r32uint, write>;
 @group(1) @binding(11) var output: StatesOut;
 @group(1) @binding(12) var lead: StatesOut;     // where the guide leads to: near frame, far one; x of layer 1: 1 if it leads
@@ -27,7 +27,7 @@ const AROUND_SIDE: i32 = 17;    // every third pixel along a side is counted,
 const STRIDE: i32 = 3;
 const ENOUGH_REPEATS: f32 = 0.08;   // share of them that must lead to repeats for the guide to lead,
 const ENOUGH_HIDDEN: f32 = 0.1;     // or seem hidden
-const IS_REPEAT: u32 = 1u;      // bits of what is found: leads to a repeat,
+const IS_REPEAT: u32 = 1u;      // bits of findings: leads to a repeat,
 const IS_HIDDEN: u32 = 0x1000u;     // seems hidden where the guide matches better,
 const MAY_TURN: u32 = 0x1000000u;   // is led by the guide if enough around are so
 
@@ -44,7 +44,7 @@ fn repeats(px: vec2i, by: vec2f) -> bool {
     return least.x < ALIKE * least.y;
 }
 
-/// What a side costs by a pixel's own displacement, and by the guide's.
+/// The cost of a side by a pixel's own displacement, and by the guide's.
 fn near_costs(px: vec2i, own: vec2f, guided: vec2f) -> vec2f {
     var costs = vec2f(0.0);
     for (var k = 0; k < 2; k++) {

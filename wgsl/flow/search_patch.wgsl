@@ -26,7 +26,7 @@ fn load_search_patch(px: vec2i) {
     for (var k = 0; k < SEARCH_PATCH; k++) { own1[k].w /= total; }
 }
 
-/// Mean difference from another frame; what is above `most` may be too small, but is above `most`.
+/// Mean difference from another frame; a value above `most` may be too small, but is above `most`.
 fn whole_cost(other: texture_2d_array<f32>, at: vec2i, most: f32) -> f32 {
     let last = vec2i(frame.size) - 1;
     let is_outside = any(at < vec2i(0)) || any(at > last);

@@ -2,7 +2,7 @@
 
 struct State {
     flow: vec2f,        // displacement to the near frame [px]
-    bend: vec2f,        // what the displacement to the far frame has beyond View.far_factor times `flow` [px]
+    bend: vec2f,        // the displacement to the far frame, less View.far_factor times `flow` [px]
     slope: vec4f,       // change of the flow: du/dx, du/dy, dv/dx, dv/dy
 }
 

@@ -5,7 +5,7 @@ const STEPS: u32 = 3u;              // see stepped()
 const FLAT: f32 = 0.00001;          // squared gradient [1/px^2] that says nothing of the place
 const LONGEST_STEP: f32 = 2.0;      // [px]
 
-struct Slide {          // what Gauss and Newton make of the differences to a frame
+struct Slide {          // sums of Gauss and Newton's method over the differences to a frame
     square: vec3f,      // of the gradient: xx, xy, yy
     product: vec2f,     // of gradient and difference
     error: f32,

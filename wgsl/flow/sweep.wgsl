@@ -56,10 +56,10 @@ var<private> around: array<vec4f, NEIGHBOURS>;      // flow and bend of the neig
 var<private> around_weight: array<f32, NEIGHBOURS>; // all of them sum up to SMOOTHNESS
 var<private> most: vec2f;           // the flow of most of the picture here [px],
 var<private> aside_price: f32;      // and the price of differing from it by 1 px
-var<private> led: vec4f;            // what the guide says here [px]: to the near frame and the far one,
+var<private> led: vec4f;            // the guide's displacements here [px]: to the near frame and the far one,
 var<private> astray_price: f32;     // and the price of differing from it by 1 px
 
-/// Each neighbour's state along its own slope, and its weight by likeness; and what most of the picture does.
+/// Each neighbour's state along its own slope, and its weight by likeness; and the motion of most of the picture.
 fn load_neighbours(px: vec2i) {
     let color = textureLoad(here, px, 0, 0).rgb;
     var total = 1e-6;

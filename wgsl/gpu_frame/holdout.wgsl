@@ -29,7 +29,7 @@ fn before(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, select(vec4f(0.0), own * counts, counts > 0.0));
 }
 
-/// After the method: what was held out comes back.
+/// After the method: holdouts come back.
 @compute @workgroup_size(WG_X, WG_Y)
 fn after(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }

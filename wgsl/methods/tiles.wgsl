@@ -185,7 +185,7 @@ fn begin_of_first() -> vec2i {
     return tiles.first * i32(tiles.edge);
 }
 
-/// The first pixel of a tile, or of what there is of it in the image.
+/// The first pixel of a tile, or of its part inside the image.
 fn begin_of(tile: vec2u) -> vec2u {
     let begin = begin_of_first() + vec2i(tile * tiles.edge) - frame.origin;
     return vec2u(clamp(begin, vec2i(0), vec2i(frame.size)));

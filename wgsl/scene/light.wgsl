@@ -1,10 +1,10 @@
-// The passes of light of one instant of a scene: what falls on its surfaces, and their colour.
+// The passes of light of one instant of a scene: the light on its surfaces, and their colour.
 //#include common/frame.wgsl
 //#include scene/trace.wgsl
 
 @group(1) @binding(3) var<uniform> view: View;
 @group(1) @binding(4) var light: Light;     // sun with its shadow and ambient light; 0 for the sky
-@group(1) @binding(5) var albedo: Light;    // what it is multiplied by
+@group(1) @binding(5) var albedo: Light;    // its factor
 
 alias Light = texture_storage_2d<rgba32float, write>;
 

@@ -41,7 +41,7 @@ struct Scene {
 @group(1) @binding(1) var<storage, read> bodies: array<Body>;
 @group(1) @binding(2) var poses: texture_2d<f32>;   // three texels each, the camera first, then the bodies
 
-const BACKGROUND_DEPTH: f32 = 1e10; // where nothing is hit: what Blender writes, and so what the files written here hold
+const BACKGROUND_DEPTH: f32 = 1e10; // where nothing is hit, as Blender writes it, and the files written here
 const CLOSE: f32 = 1e-3;            // hits nearer than this to a ray's start are the surface it left [scene units]
 const MOST_BODIES: u32 = 1024u;     // bounds are uniforms, poses rows of a texture: storage is a third slower on lavapipe
 const RING_STEPS: u32 = 64u;        // of sphere tracing towards a ring's surface, at most
@@ -255,7 +255,7 @@ fn radiance(hit: Hit, ray: Ray, now: Instant) -> vec3f {
     return lit.color * (lit.sun + lit.ambient + lit.emitted) + vec3f(lit.specular * scene.sun.w);
 }
 
-struct Lighting {       // of what a ray met
+struct Lighting {       // where a ray met a surface
     color: vec3f,
     sun: f32,           // light that is multiplied by the colour: with its shadow,
     ambient: f32,

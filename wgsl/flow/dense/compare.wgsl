@@ -3,7 +3,7 @@
 //#include flow/dense/differences.wgsl
 
 @group(1) @binding(2) var motion: texture_2d<f32>;      // of the whole picture, by dense inverse search [px]
-@group(1) @binding(3) var state: texture_2d<f32>;       // of this level, with what blocks found [px]
+@group(1) @binding(3) var state: texture_2d<f32>;       // of this level, with the results of blocks [px]
 @group(1) @binding(4) var areas: texture_2d<f32>;       // of the small level, see turn.wgsl
 @group(1) @binding(5) var output: texture_storage_2d<rgba32float, write>;   // cost of each; 1 near other motion
 

@@ -1,4 +1,4 @@
-// An order in depth: what moves otherwise than most of the picture is nearer.
+// An order in depth: surfaces that move otherwise than most of the picture are nearer.
 //#include common/frame.wgsl
 //#include flow/dense/summary.wgsl
 //#include flow/dense/turn.wgsl

@@ -3,7 +3,7 @@
 //#include flow/dense/differences.wgsl
 
 @group(1) @binding(2) var begin: texture_2d<f32>;       // motion before [px]
-@group(1) @binding(3) var ways: texture_2d<f32>;        // what blocks.wgsl wrote
+@group(1) @binding(3) var ways: texture_2d<f32>;        // output of blocks.wgsl
 @group(1) @binding(4) var output: texture_storage_2d<rgba32float, write>;   // to_prev, to_next [px]
 @group(1) @binding(5) var areas: texture_storage_2d<r32float, write>;       // TRIED, or OTHERWISE
 

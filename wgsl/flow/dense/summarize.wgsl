@@ -1,4 +1,4 @@
-// What most of the picture does: noise, the median of the motion, and the affine motion of most of it, by least squares
+// The picture as a whole: noise, the median of the motion, and the affine motion of most of it, by least squares
 // whose weights fall with the distance (Geman and McClure, "Statistical Methods for Tomographic Image Reconstruction",
 // 1987), of which the scale shrinks. One workgroup for each neighbour.
 //#include common/frame.wgsl

@@ -1,4 +1,4 @@
-// What passes over the small level hand on: how often each value occurs, what most of the picture does, and which blocks
+// Results of passes over the small level: how often each value occurs, the motion of most of the picture, and which blocks
 // are searched.
 
 struct Most {           // affine motion to a neighbour [px], of places as centred() gives them: columns
@@ -26,7 +26,7 @@ const TABLES: u32 = 5u;
 const BINS_PER_LEVEL: f32 = 4.0;    // of 255, of changes
 const BINS_PER_PIXEL: f32 = 4.0;    // of motion
 
-/// The place of a value in a table; what is beyond its ends counts there.
+/// The place of a value in a table; values beyond its ends count there.
 fn bin(table: u32, value: f32) -> u32 {
     return table * BINS + u32(clamp(value, 0.0, f32(BINS) - 1.0));
 }

@@ -9,7 +9,7 @@ struct Groups {         // of workgroups, one for each block of the list, as ind
     deep: u32,
 }
 
-@group(1) @binding(2) var fits: texture_2d<f32>;        // what measure.wgsl wrote
+@group(1) @binding(2) var fits: texture_2d<f32>;        // output of measure.wgsl
 @group(1) @binding(3) var<storage, read> summary: Summary;
 @group(1) @binding(4) var<storage, read_write> groups: Groups;
 @group(1) @binding(5) var<storage, read_write> list: List;

@@ -102,7 +102,7 @@ fn pack_matte(matte: Matte) -> vec4u {
     return vec4u(depth | coverage | select(0u, HAS_BACK, matte.has_back), bitcast<u32>(matte.weight), 0u, 0u);
 }
 
-/// `bits`: what pack_matte() gave; without the weight, that of pixels that all count alike.
+/// `bits`: the result of pack_matte(); without the weight, that of pixels that all count alike.
 fn unpack_matte(bits: vec4u, is_weighted: bool) -> Matte {
     let coverage = f32(bits.x & WHOLE) / f32(WHOLE);
     let depth = bitcast<f32>((bits.x >> MATTE_BITS) << (MATTE_BITS - 1u));

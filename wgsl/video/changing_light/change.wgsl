@@ -1,4 +1,4 @@
-// What the light of a picture differs from its mean over the exposure, where the same is seen in another light before
+// The difference between the light of a picture and its mean over the exposure, where the same is seen in another light before
 // or after it, or where neither shows it. Between two pictures, light is taken to change evenly. Where a picture stands,
 // this tells how far, and changed.wgsl takes each pixel's own light of the neighbours, which averages noise and jitter.
 //#include common/frame.wgsl
@@ -14,7 +14,7 @@ struct Light {
     shares: vec2f,      // of their light in the exposure
     exist: vec2u,       // 1: there is such a picture
     begins: u32,        // 1: the first change of the exposure
-    whole: u32,         // 1: the picture is all of the exposure, so that what stands is told
+    whole: u32,         // 1: the picture is all of the exposure, so that static areas are known
 }
 
 @group(1) @binding(0) var<uniform> light: Light;
@@ -36,9 +36,9 @@ const SIDE: i32 = 5;            // of a patch [small px]
 const RADIUS: i32 = 2;
 const UNLIKE: f32 = 0.5;        // share of the variance that another brightness and contrast do not explain: something else
 const LEAST: f32 = 1.5e-5;      // variance of one level of 255, added to every variance
-const NEAR: f32 = 0.1;          // mean difference of what may as well be something else, as a fade does little harm,
+const NEAR: f32 = 0.1;          // mean difference of places that may as well show something else, as a fade does little harm,
 const NOISE: f32 = 0.0157;      // and of nothing
-const STILL: f32 = 1.0;         // px of motion, standard deviation of what stands,
+const STILL: f32 = 1.0;         // px of motion, standard deviation of static areas,
 const JITTER: f32 = 3.0;        // and of motion there and back
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -51,7 +51,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var ahead = back;
     if light.exist.x == 1u { back = toward(PREVIOUS, vec2i(id.xy), ways.xy); }
     if light.exist.y == 1u { ahead = toward(NEXT, vec2i(id.xy), ways.zw); }
-    let lost = (1.0 - back.same) * (1.0 - ahead.same);  // what neither shows is not there all the time
+    let lost = (1.0 - back.same) * (1.0 - ahead.same);  // a thing that neither shows is not there all the time
     let full = f32(STEP) * ways;
     let rests = vec2f(resting(full.xy, full.zw), resting(full.zw, full.xy));
     let stands = f32(light.whole) * rests * vec2f(back.near, ahead.near);
@@ -66,7 +66,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 
 /// How far a pixel rests that has this way to a neighbour and that to the other [px], 0 to 1: one that hardly moves, or seems
-/// to move there and back, as in noise and jitter. What really moves goes on.
+/// to move there and back, as in noise and jitter. True motion goes on.
 fn resting(way: vec2f, other: vec2f) -> f32 {
     let on = (way - other) / (2.0 * STILL);
     let back = (way + other) / (2.0 * JITTER);
@@ -88,7 +88,7 @@ fn held(small: vec2u) -> f32 {
     return most;
 }
 
-/// What is at the end of a way [small px].
+/// The light at the end of a way [small px].
 fn toward(other: u32, px: vec2i, way: vec2f) -> End {
     let last = vec2i(frame.size) - 1;
     let to = vec2f(px) + way;

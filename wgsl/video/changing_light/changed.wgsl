@@ -10,13 +10,13 @@ override STEP: u32 = 4u;    // px of the picture along a small pixel; 0: nothing
 
 const ALIKE: f32 = 0.4;     // difference of roots of light beyond which a pixel shows something else
 
-/// Light of a pixel, premultiplied by alpha, with what it changes.
+/// Light of a pixel, premultiplied by alpha, with its change.
 fn changed(own: vec4f, px: vec2u) -> vec4f {
     if STEP == 0u { return own; }
     let at = (vec2f(px) + 0.5) / (f32(STEP) * vec2f(textureDimensions(changes)));
     let change = textureSampleLevel(changes, linear, at, 0.0);
     // A pixel loses at most the share of the exposure in which its light fades to that of the neighbours. A small pixel beside a
-    // lamp holds light of the lamp, and would darken what is beside it further.
+    // lamp holds light of the lamp, and would darken its surroundings further.
     var color = own.rgb + max(own.a * change.rgb, -change.w * max(own.rgb, vec3f(0.0)));
     let shares = own.a * textureSampleLevel(standing, linear, at, 0.0).xy;
     if any(shares > vec2f(0.0)) {

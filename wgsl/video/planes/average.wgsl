@@ -26,10 +26,10 @@ struct Average {
 @group(1) @binding(6) var<storage, read_write> sums: array<mat4x4f>;    // where there are more than eight pictures
 @group(1) @binding(7) var<storage, read_write> packed: array<u32>;
 
-override READ_X: u32 = 2u;      // 1 or 2: columns, rows of pixels to one sample of chroma, of what is read
+override READ_X: u32 = 2u;      // 1 or 2: columns, rows of pixels to one sample of chroma, of the input
 override READ_Y: u32 = 2u;
 override READ_BITS: u32 = 8u;   // 8 or 16: of a sample in its texel
-override WRITE_X: u32 = 2u;     // of what is written
+override WRITE_X: u32 = 2u;     // of the output
 override WRITE_Y: u32 = 2u;
 override BITS: u32 = 8u;        // 8 or 16: of a sample that is written, in its word
 override FIRST: bool = true;    // `sums` is empty
@@ -187,7 +187,7 @@ fn light(y: f32, cb: f32, cr: f32) -> vec3f {
     return light_of(fma(vec3f(red_row.x), vec3f(y), tint));     // all have the same share of luma
 }
 
-/// A sum, and what was kept of the one before.
+/// A sum, and the part kept of the one before.
 fn with_sums(row: Row, place: u32) -> Row {
     return Row(
         row.a + colors(sums[place]), row.b + colors(sums[place + 1u]),

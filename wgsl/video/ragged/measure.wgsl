@@ -12,7 +12,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, vec4f(there_and_back(px, vec2i(1, 0)), there_and_back(px, vec2i(0, 1)), 0.0, 0.0));
 }
 
-/// What the changes from pixel to pixel add up to, beyond the change from the first to the last.
+/// The sum of the changes from pixel to pixel, beyond the change from the first to the last.
 fn there_and_back(px: vec2i, step: vec2i) -> f32 {
     let first = textureLoad(motion, inside(px - RADIUS * step), 0);
     var last = first;

@@ -4,7 +4,7 @@
 
 @group(1) @binding(0) var motion: texture_2d<f32>;      // to_prev, to_next [px]
 @group(1) @binding(1) var depth: texture_2d<f32>;
-@group(1) @binding(2) var measured: texture_2d<f32>;    // what measure.wgsl wrote
+@group(1) @binding(2) var measured: texture_2d<f32>;    // output of measure.wgsl
 @group(1) @binding(3) var motion_out: Output;
 @group(1) @binding(4) var depth_out: texture_storage_2d<r32float, write>;
 

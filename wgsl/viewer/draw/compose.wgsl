@@ -9,7 +9,7 @@
 @group(1) @binding(3) var picture: texture_storage_2d<rgba16float, write>;  // display values
 
 struct View {
-    area: vec4f,        // x, y, width, height of what the panel leaves free [px]
+    area: vec4f,        // x, y, width, height of the area beside the panel [px]
     place: vec4f,       // the same of the whole image, which may extend beyond the area
     key: vec4f,         // the same of the colour bar; without a width there is none
     wheel: vec4f,       // the same of the colour wheel of motion
@@ -21,7 +21,7 @@ struct View {
     fastest: f32,       // speed of full brightness [image heights per frame]
 }
 
-override FIRST: u32 = 0u;       // what the first image holds
+override FIRST: u32 = 0u;       // content of the first image
 override SECOND: u32 = 0u;
 override COMPARE: u32 = 0u;
 override TONE: u32 = 0u;

@@ -97,7 +97,7 @@ fn look_far(sum: ptr<function, Background>, px: vec2i, motion: vec4f, z: f32, f:
     }
 }
 
-/// Add what a neighbouring frame shows, if all of the 3 x 3 around the place is as deep as expected.
+/// Add the colour of a neighbouring frame, if all of the 3 x 3 around the place is as deep as expected.
 fn look(sum: ptr<function, Background>, px: vec2i, step: vec2f, z: f32, is_next: bool) {
     let at = vec2f(px) + 0.5 + step;
     let is_inside = all(at >= vec2f(0.5)) && all(at <= vec2f(frame.size) - 0.5);
@@ -122,7 +122,7 @@ fn look(sum: ptr<function, Background>, px: vec2i, step: vec2f, z: f32, is_next:
     }
 }
 
-/// A neighbour's colour with its gains, bilinear, as samplers cannot filter what is read from storage.
+/// A neighbour's colour with its gains, bilinear, as samplers cannot filter storage textures.
 fn color_around(at: vec2f, is_next: bool) -> vec4f {
     let c = corners_of(at);
     let above = mix(color_there(c.xy, is_next), color_there(c.zy, is_next), share_of(at).x);

@@ -1,4 +1,4 @@
-// What is known of the silhouettes around a tile, by the counts of its edges. In a crowd of surfaces, as in grass, there is
+// The silhouettes around a tile, by the counts of its edges. In a crowd of surfaces, as in grass, there is
 // no foreground and no background: silhouettes stay as they are there. Where vectors are not filtered, colours alone tell
 // coverage, and wrongly where surfaces are small: silhouettes whose surfaces hardly move apart stay as they are there too.
 //#include common/frame.wgsl
@@ -24,7 +24,7 @@ fn count_edge(px: vec2i, kind: u32) {
     atomicAdd(&crowds[word_of(vec2u(px) / TILE, kind)], 1u);
 }
 
-/// Find out what is around a tile, once all pixels are counted.
+/// Classify the surroundings of a tile, once all pixels are counted.
 fn look_around(tile: vec2u) {
     let low = tile - min(tile, vec2u(CROWD_TILES));
     let high = min(tile + CROWD_TILES + 1u, tiles_of(frame.size));
@@ -40,7 +40,7 @@ fn look_around(tile: vec2u) {
     atomicStore(&crowds[word_of(tile, AROUND_TILE)], select(0u, CROWD, is_crowd) | select(0u, UNFILTERED, is_unfiltered));
 }
 
-/// What is known of the tile of a pixel.
+/// The class of the tile of a pixel.
 fn around_tile(px: vec2i) -> u32 {
     return atomicLoad(&crowds[word_of(vec2u(px) / TILE, AROUND_TILE)]);
 }

@@ -1,4 +1,4 @@
-// One word per pixel with its depth, flagged where it is at an edge: what edges.wgsl finds, for layers.wgsl.
+// One word per pixel with its depth, flagged where it is at an edge, from edges.wgsl for layers.wgsl.
 //#include common/depth.wgsl
 //#include common/frame.wgsl
 

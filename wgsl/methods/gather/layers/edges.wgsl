@@ -13,19 +13,19 @@
 alias Flags = texture_storage_2d<r32uint, write>;
 
 // From this difference on [px], motions tell surfaces apart as well: the depth ratio that is asked for shrinks with it,
-// down to LEAST_SHARE of its difference from 1, which is above what half floats round.
+// down to LEAST_SHARE of its difference from 1, which is above the rounding of half floats.
 const APART_MOTION: f32 = 4.0;
 const LEAST_SHARE: f32 = 0.1;
 const FAST: f32 = 2.0;          // difference of the motions at an edge that tells whether vectors are filtered [px],
 const MIXED: f32 = 0.2;         // where they differ by more than this share of it on the same side of the edge
 const SLOW_MOTION: f32 = 0.5;   // how far surfaces move apart, at most, that hardly do while the shutter is open, by both vectors [px];
 const WIDE_MOTION: f32 = 8.0;   // the same of a wide front's own pixels, as a rule: beside it, the 5 x 5 show less of it;
-const RAMP_MOTION: f32 = 0.85;   // the same of what is no edge if motions change as much around it:
+const RAMP_MOTION: f32 = 0.85;   // the same where it is no edge if motions change as much around it:
 const RAMP_SHARE: f32 = 0.6;    // by more than this share
 const WHOLE_SQUARES: u32 = 0x1ce7u; // of the 5 x 5 bits, the first three of the first three rows: 3 x 3 that begin there end within
 
 /// First pass: a pixel is at an edge if depths differ in its 3 x 3, and motions from its own too. The more motions differ,
-/// the less depths have to: what moves so differently is no smooth surface.
+/// the less depths have to: motions that differ so much are no smooth surface.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn detect_edges(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
@@ -107,7 +107,7 @@ fn is_wide(px: vec2i, between: f32, wanted: bool) -> bool {
     return (squares & WHOLE_SQUARES) != 0u;
 }
 
-/// Of a pixel and the ones to its left and right. Written out, as is what works on 3 x 3 pixels: lavapipe unrolls no loop.
+/// Of a pixel and the ones to its left and right. Written out, like all code on 3 x 3 pixels: lavapipe unrolls no loop.
 fn three_depths(px: vec2i) -> vec3f {
     return vec3f(depth_at(px - vec2i(1, 0)), depth_at(px), depth_at(px + vec2i(1, 0)));
 }
@@ -116,7 +116,7 @@ fn are_between(z: vec3f, low: f32, high: f32) -> vec3<bool> {
     return (z > vec3f(low)) & (z < vec3f(high));
 }
 
-/// Second pass: what is around a tile. An invocation is a tile; beyond the last, that one.
+/// Second pass: the surroundings of a tile. An invocation is a tile; beyond the last, that one.
 @compute @workgroup_size(WG_X, WG_Y)
 fn look_around_tiles(@builtin(global_invocation_id) id: vec3u) {
     look_around(min(id.xy, tiles_of(frame.size) - 1u));

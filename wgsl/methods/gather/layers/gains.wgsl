@@ -1,4 +1,4 @@
-// The gain of a pixel whose light is made that of another frame, in one word: what relight.wgsl finds.
+// The gain of a pixel whose light is made that of another frame, in one word, from relight.wgsl.
 
 const MOST_DARKER: f32 = -2.0794415;    // logarithm of an eighth
 const MOST_BRIGHTER: f32 = 1.3862944;   // of four

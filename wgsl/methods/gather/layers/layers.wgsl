@@ -1,5 +1,5 @@
 // Silhouettes as two layers. A renderer filters colours and vectors over the surfaces that a pixel shows; here these
-// are separated again, as in matting: a front layer with its coverage, and what is behind it.
+// are separated again, as in matting: a front layer with its coverage, and its background.
 //#include common/frame.wgsl
 //#include common/path.wgsl
 //#include methods/gather/worklist.wgsl
@@ -41,7 +41,7 @@ fn three_flags(px: vec2i) -> u32 {
 }
 
 /// First pass: every pixel as one layer, which is copied to BACK after it, and the list of edge pixels, which
-/// `separate_layers` corrects. Stores are what costs in this pass.
+/// `separate_layers` corrects. Stores dominate the cost of this pass.
 @compute @workgroup_size(CELL_TILES * TILE, STRIP_HEIGHT)
 fn write_single_layer(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let k = worklist_index(group);
@@ -122,7 +122,7 @@ struct Split {          // the layers of an edge pixel
     told: u32,          // of the back: SEEN if it is not inferred, AROUND if neighbouring frames gave its colour
 }
 
-/// What an edge pixel is if it shows one surface after all.
+/// The layers of an edge pixel that shows one surface after all.
 fn one_layer(edge: EdgePixel, around: Around) -> Split {
     return Split(edge.color, vec4f(0.0), edge.motion, edge.motion, edge.z, 0.0,
                  around.front_place.at, around.back_place.at, 1.0, 0u);
@@ -150,7 +150,7 @@ fn split_layers(split: ptr<function, Split>, edge: EdgePixel, around: Around, si
         (*split).front_z = front_z;
     } else {
         let share = select(measured, 1.0, measured > FULL);
-        // Together they are the pixel's colour: what would be less than black in front, or too bright, is behind.
+        // Together they are the pixel's colour: light that would be below black in front, or too bright, is behind.
         let behind = (1.0 - share) * edge.counts;
         let rest = edge.color - behind * background;
         let contrast = select(MOST_CONTRAST, WIRE_CONTRAST, sides.thin);

@@ -38,7 +38,7 @@ override WEIGHTED: bool = false;    // pixels have weights
 
 const SHOWN_DEPTH_RATIO: f32 = 1.15;    // depths of a surface in two frames differ by less
 const SHOWN_RETURNS: f32 = 1.0;         // and its vectors lead there and back within this [px]
-const SQUARE: u32 = 2u;                 // side of what gets one gain [px]
+const SQUARE: u32 = 2u;                 // side of the squares with one gain [px]
 const REVEALED_TIMES: u32 = 4u;         // of the exposure at which a pixel is looked for
 const FARTHEST: i32 = 32;               // how far from a hidden pixel its surface is looked for, across and down [px]
 const LIGHT_TILES: i32 = 2;             // as many tiles
@@ -58,7 +58,7 @@ struct Shown {          // a pixel of the neighbour, seen in the frame
     is_there: bool,     // and the frame shows it there
     is_hidden: bool,    // something else is there
     surface: vec4u,     // of the neighbour's pixel
-    own: vec4u,         // what the frame shows there
+    own: vec4u,         // the frame's own surface there
 }
 
 fn shown(px: vec2i) -> Shown {
@@ -108,7 +108,7 @@ fn squares_of(size: vec2u) -> vec2u {
     return (size + SQUARE - 1u) / SQUARE;
 }
 
-/// True if at some time of the exposure, what hides a pixel in the frame does not hide it.
+/// True if at some time of the exposure, the surface that hides a pixel in the frame does not hide it.
 fn appears(px: vec2i, here: Shown) -> bool {
     let window = exposure_window(0.0);
     var covered = 0u;

@@ -147,7 +147,7 @@ fn add(side: ptr<function, Side>, share: f32, motion_there: vec4f, z: f32, color
 struct Sides {
     front: Side,
     back: Side,
-    front_motion: vec4f,    // the mean; of a wire, what differs most from the background's
+    front_motion: vec4f,    // the mean; of a wire, the motion that differs most from the background's
     back_motion: vec4f,
     thin: bool,             // no pure pixel is in front: a wire
     purest: vec2i,          // the pixel that gave a wire's motion

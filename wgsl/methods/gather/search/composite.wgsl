@@ -13,7 +13,7 @@ struct Composite {
     color: vec4f,       // premultiplied by coverage
     weight: f32,
     coverage: f32,
-    residual: f32,      // distance from the pixel of what is composited, times its coverage [px]
+    residual: f32,      // distance of composited samples from the pixel, times their coverage [px]
     neighbours: f32,    // the part of the coverage that neighbouring frames gave
     unlit: f32,         // the part whose light moves and is not known
 }
@@ -27,7 +27,7 @@ fn add(sum: ptr<function, Composite>, one: Composite, share: f32) {
     (*sum).unlit += share * one.unlit;
 }
 
-/// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then what is opaque.
+/// Composite over one another (Porter and Duff's "over"): edges, by the texels of their own surface, then opaque samples.
 fn composite_front_to_back(visible: Visible, t: f32, duration: f32, around: f32, step: f32) -> Composite {
     let front_edge = is_before(visible.front_edge, visible.opaque);
     let back_edge = front_edge && is_before(visible.back_edge, visible.opaque)
@@ -72,7 +72,7 @@ fn composite_front_to_back(visible: Visible, t: f32, duration: f32, around: f32,
     return sum;
 }
 
-/// What the texels of its own surface show of a sample, the mean over the time `around` it; nothing unless `wanted`.
+/// The colour of a sample from the texels of its own surface, the mean over the time `around` it; nothing unless `wanted`.
 fn texels_of(sample: Sample, t: f32, around: f32, step: f32, wanted: bool) -> Composite {
     let width = width_of(step);
     var off = vec2f(0.0);

@@ -1,4 +1,4 @@
-// Colours of what no frame shows: taps of the frame itself, and what is filled from around.
+// Colours of surfaces that no frame shows: taps of the frame itself, and fills from around.
 //#include common/frame.wgsl
 //#include methods/gather/search/composite.wgsl
 //#include methods/gather/search/search.wgsl
@@ -12,7 +12,7 @@ const FILL_STEPS: u32 = 13u;            // to every side, each FILL_GROWTH times
 const FILL_GROWTH: f32 = 1.414213562;
 const BORDER_SPREAD: f32 = 0.5;         // half the length of the border that stands for a place beyond it, per distance
 const GOLDEN_RATIO: f32 = 0.618034;     // less 1
-const FILL_DEPTH_RATIO: f32 = 1.1;      // of what is behind a surface
+const FILL_DEPTH_RATIO: f32 = 1.1;      // of surfaces behind another one
 
 /// A tap of the frame itself.
 fn tap(p: vec2f) -> Composite {
@@ -32,7 +32,7 @@ fn at_border(p: vec2f, n: u32) -> vec2f {
     return select(nearest + BORDER_SPREAD * max(beyond.x, beyond.y) * turn * along, p, is_inside(p));
 }
 
-/// Add what is hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
+/// Add surfaces that are hidden behind the pixel in all frames: the nearest surfaces behind its own, in FILL_DIRECTIONS
 /// directions, weighted by the inverse root of their distances: the nearest alone would change from pixel to pixel.
 fn add_hidden(sum: ptr<function, Composite>, id: vec2u, share: f32) {
     let z = abs(unpack_depth(surface_of(vec2i(id), 0u)));

@@ -1,4 +1,4 @@
-// Light that moves: what is added to the colour of a surface because it is seen at another time than that of its frame.
+// Light that moves: the change of a surface's colour between the time of its frame and the time of the sample.
 // It is known on this frame's surfaces at a few times, the nodes (see shading/compose.wgsl).
 //#include common/loops.wgsl
 //#include common/path.wgsl
@@ -34,7 +34,7 @@ fn is_light_moving(at: vec2f) -> bool {
     return (light_changes[1u + light_tile(px)] & CHANGES) != 0u;
 }
 
-/// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`: what is added to its `color`, which covers this
+/// For a sample `at` [px] of a layer, around the time `t`, for as long as `duration`: the change of its `color`, which covers this
 /// much of the pixel.
 fn moving_light(color: vec4f, coverage: f32, at: vec2f, layer: u32, t: f32, duration: f32) -> vec4f {
     if layer == 0u {
@@ -59,12 +59,12 @@ fn moving_light(color: vec4f, coverage: f32, at: vec2f, layer: u32, t: f32, dura
     return vec4f(select(vec3f(0.0), there.a * change, same), 0.0);
 }
 
-/// A share of a colour that covers this much of the pixel, if what this frame shows at a place [px] rests.
+/// A share of a colour that covers this much of the pixel, if this frame's surface at a place [px] is static.
 fn share_of(color: vec4f, coverage: f32, share: vec3f, at: vec2f) -> vec3f {
     return select(vec3f(0.0), (color.rgb + coverage * DARK) * share, rests_at(at));
 }
 
-/// True if what this frame shows at a place [px] rests.
+/// True if this frame's surface at a place [px] is static.
 fn rests_at(at: vec2f) -> bool {
     let trajectory = unpack_trajectory(surface_of(vec2i(floor(at)), 0u));
     return rests(vec4f(displacement5(trajectory, -1.0), displacement5(trajectory, 1.0)));

@@ -1,4 +1,4 @@
-// The colours of what passes by a pixel while a sample stands: a sample is searched at one instant, and stands for all of
+// The colours that pass by a pixel while a sample stands: a sample is searched at one instant, and stands for all of
 // them until the middle between it and the next. On long ways it is read at two places of its way, so that as few as 16 samples
 // leave no steps.
 //#include common/frame.wgsl

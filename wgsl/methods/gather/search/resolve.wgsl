@@ -20,11 +20,11 @@
 
 override PLAIN: bool = false;       // the blocks have one layer at all times, or nothing moves there: one search is enough
 
-const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], what is there is hidden
+const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], the surface there is hidden
 
-// Loops are left from their end, and what is rare has a loop of its own over bits of times: see lavapipe.md.
+// Loops are left from their end, and rare cases have a loop of their own over bits of times: see lavapipe.md.
 
-struct Pixel {          // what all times of a pixel have in common
+struct Pixel {          // common to all times of a pixel
     x: vec2f,           // its centre [px]
     block: vec2u,
     a: Candidates,      // of the frame and its neighbours
@@ -32,7 +32,7 @@ struct Pixel {          // what all times of a pixel have in common
     c: Candidates,
     trajectory: Trajectory5,    // its own
     times: SampleTimes,
-    step: f32,          // the longest way of what may be there from sample to sample [px]
+    step: f32,          // the longest way of any surface there from sample to sample [px]
     share: f32,         // of a time, applied before adding, so that no sum of finite colours overflows
 }
 
@@ -42,7 +42,7 @@ struct Times {          // the times of this turn, a bit each
     single: u32,        // those at which one search is enough
 }
 
-struct Exposure {       // what is added up over all times
+struct Exposure {       // sums over all times
     sum: Composite,
     accepted: f32,      // times at which a sample was found
     left_image: f32,    // those at which the pixel's path has left the picture
@@ -83,7 +83,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     textureStore(output, id, result_of(exposure, pixel, id, is_static));
 }
 
-/// Add what is visible at a time. (A pointer to a part of a variable cannot be handed on everywhere.)
+/// Add the visible surface at a time. (A pointer to a part of a variable cannot be handed on everywhere.)
 fn add_time(exposure: ptr<function, Exposure>, one: Composite, share: f32) {
     var sum = (*exposure).sum;
     add(&sum, one, share);
@@ -146,7 +146,7 @@ fn add_single(exposure: ptr<function, Exposure>, times: ptr<function, Times>, pi
     }
 }
 
-/// Add all other times: what frames show, composited front to back.
+/// Add all other times: samples of frames, composited front to back.
 fn add_layered(exposure: ptr<function, Exposure>, times: Times, pixel: Pixel, starts: Starts) {
     var todo = ~times.single & times.valid;
     var unresolved = 0u;

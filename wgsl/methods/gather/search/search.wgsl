@@ -198,7 +198,7 @@ fn surface_of(px: vec2i, layer: u32) -> vec4u {
 /// One step d <- displacement at (x - d) in a layer, `u` after its frame's instant. INFINITE residual outside the image.
 fn warp_step(x: vec2f, d: vec2f, u: f32, layer: u32) -> WarpState {
     let p = x - d;
-    let surface = surface_of(vec2i(p), layer);      // towards 0: what is outside does not matter
+    let surface = surface_of(vec2i(p), layer);      // towards 0: pixels outside do not matter
     let next = displacement_of(surface, u);
     let step = next - d;
     return WarpState(surface.w, next, select(INFINITE, dot(step, step), is_inside(p)));

@@ -4,16 +4,16 @@
 //#include methods/gather/search/search.wgsl
 
 override CONFIDENCE: bool = false;  // show how sure the result is instead of it
-override CROWDED: bool = false;     // tiles are crowded: searches of front layers start from what is scattered too
+override CROWDED: bool = false;     // tiles are crowded: searches of front layers start from scattered motions too
 
-const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: what one showed is preferred
+const INFERRED_DEPTH_BIAS: f32 = 1.2;   // factor of the depth of backgrounds that no frame showed: others are preferred
 const ITERATIONS_SAVED: u32 = 3u;       // from a tile's motion, compared with a start from nothing
-const SCATTERED: u32 = 16u;             // bit of what is scattered among the pending starts
+const SCATTERED: u32 = 16u;             // bit of scattered motions among the pending starts
 const MAX_STEP_RATIO: f32 = 0.75;       // of a step to the distance from the first solution: longer ones end an iteration
 const ELSEWHERE: f32 = 2.0;             // samples of one frame farther apart than this [px] are of different surfaces
 const BODY_DEPTH_RATIO: f32 = 1.3;      // of depths close together on one body: at outlines, round ones fall away steeply
 const OWN_TIME: f32 = 0.0625;           // up to here from its instant, the frame itself is surer of the surface of a silhouette [frame intervals]
-const NEIGHBOUR_RESIDUAL: f32 = 0.5;    // MAX_RESIDUAL of other frames' samples: what turns away from edge on is wide there
+const NEIGHBOUR_RESIDUAL: f32 = 0.5;    // MAX_RESIDUAL of other frames' samples: a surface that turns away from edge on is wide there
 const GOES_ON: f32 = 5.0;               // how far a surface is taken to go on behind something nearer [px]
 const GONE: f32 = 2.0;                  // a front that has moved as far from its pixel shows the background there [px]
 
@@ -25,7 +25,7 @@ struct Sample {
     layer: u32,         // of `surfaces`
 }
 
-struct Cover {          // what a pixel's own layer may hide of other frames
+struct Cover {          // a pixel's own layer, which may hide samples of other frames
     z: f32,             // its depth
     goes_on: bool,      // it is still there
 }
@@ -72,7 +72,7 @@ fn resolve_visibility(x: vec2f, starts: Starts, t: f32,
 }
 
 /// The search after `last`. The back of the frame itself where its front is `hidden`; the neighbour there too, unless that back
-/// belongs to what is before it, or far from the frame's own instant; the other neighbour if the background is at best inferred; the frames beyond them if
+/// belongs to a surface before it, or far from the frame's own instant; the other neighbour if the background is at best inferred; the frames beyond them if
 /// there is none; the neighbours' backs at last, where it is at best inferred and no edge is before it.
 fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool) -> u32 {
     let none = visible.opaque.depth >= INFINITE;
@@ -90,7 +90,7 @@ fn next_search(last: u32, visible: Visible, t: f32, hidden: bool, has_edge: bool
     return next;
 }
 
-struct Query {          // what is searched, and where
+struct Query {          // layer and place of a search
     x: vec2f,           // the pixel [px]
     u: f32,             // time since the frame's instant [frame intervals]
     layer: u32,         // of `surfaces`
@@ -99,7 +99,7 @@ struct Query {          // what is searched, and where
 
 struct Starts {         // whose trajectories the first searches of a pixel start from, read once
     own: Trajectory5,
-    own_back: vec4u,    // what is at the pixel's place in the frame's own back layer, see pack_surface()
+    own_back: vec4u,    // the surface at the pixel in the frame's own back layer, see pack_surface()
     front1: vec4u,      // and in the layers of neighbouring frames
     back1: vec4u,
     front2: vec4u,
@@ -122,7 +122,7 @@ fn start_of(starts: Starts, query: Query) -> vec2f {
 }
 
 /// Search one layer from `own`, the displacement of the pixel's own trajectory [px]; then, in a front layer, from what is
-/// scattered and from the tile's candidates, if they may be nearer than what is visible already.
+/// scattered and from the tile's candidates, if they may be nearer than the visible surface.
 fn search_layer(visible: ptr<function, Visible>, query: Query, own: vec2f, candidates: Candidates) {
     let is_front = query.layer % 2u == 0u;
     var seeds = seeds_at(candidates, query.u, select(0u, may_be_there(candidates, query.u), is_front));
@@ -154,12 +154,12 @@ struct First {          // where the first search of a layer led; if nowhere, th
     depth: f32,         // biased; 0 at a silhouette, which nothing counts as nearer than
 }
 
-/// True if what is at a displacement and a depth is the first solution. What moves alike, but is clearly nearer, is not.
+/// True if the surface at a displacement and a depth is the first solution. One with equal motion that is clearly nearer is not.
 fn is_again(d: vec2f, depth: f32, first: First) -> bool {
     return same_solution(d, first.d) && depth * SURFACE_DEPTH_RATIO >= first.depth;
 }
 
-/// The displacement of the pixel in a word of what is scattered [px].
+/// The displacement of the pixel in a word of scattered motions [px].
 fn displacement_in(word: u32, query: Query) -> vec2f {
     var d = vec2f(0.0);
     for (var i = 0u; i < select(0u, 1u, CROWDED && word != 0u); i++) {

@@ -10,7 +10,7 @@
 @group(1) @binding(1) var flow_out: Flow;                   // flow [px], trust 0..1
 @group(1) @binding(2) var weighted: Weighted;               // flow times weight, weight, trust; of `find_planes`: see `planes`
 @group(1) @binding(3) var depth: texture_2d<f32>;           // stored as given
-@group(1) @binding(4) var known: texture_2d<f32>;           // stored as rgba32float; of `fill`: what `weigh` wrote
+@group(1) @binding(4) var known: texture_2d<f32>;           // stored as rgba32float; of `fill`: output of `weigh`
 
 alias Flow = texture_storage_2d<rgba16float, write>;
 alias Weighted = texture_storage_2d<rgba32float, write>;
@@ -33,7 +33,7 @@ fn weigh(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     textureStore(weighted, id, vec4f(weight * by, weight, trusted));
 }
 
-/// That around it stands for what is not trusted.
+/// Untrusted flow is replaced by the flow around it.
 @compute @workgroup_size(WG_X, WG_Y)
 fn fill(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);

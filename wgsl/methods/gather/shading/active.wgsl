@@ -1,10 +1,10 @@
-// Tiles of pixels by what light does there: far from all changes, costly passes write nothing.
+// Tiles of pixels by changes of light in them: far from all changes, costly passes write nothing.
 //#include common/frame.wgsl
 
 const LIGHT_TILE: u32 = 16u;    // side [px of light]
 override LIGHT_SCALE: u32 = 1u; // side of a pixel of light [px]; passes over light alone have 1
 
-// What is known of a tile, bits of its word.
+// Properties of a tile, bits of its word.
 const MAY_CHANGE: u32 = 1u;     // light differs from frame to frame somewhere in it, if only by noise
 const CHANGES: u32 = 2u;        // it changes in it, or beside it
 const NEAR: u32 = 4u;           // it changes in a tile that is NEAR_TILES away at most

@@ -3,7 +3,7 @@
 //#include methods/gather/shading/listed.wgsl
 //#include methods/gather/shading/light.wgsl
 
-@group(1) @binding(0) var source: texture_2d<f32>;        // stored as rgba32float; of `down`: what `across` wrote
+@group(1) @binding(0) var source: texture_2d<f32>;        // stored as rgba32float; of `down`: output of `across`
 @group(1) @binding(1) var output: Blurred;
 
 alias Blurred = texture_storage_2d<rgba32float, write>;

@@ -15,7 +15,7 @@ struct Node {
 @group(1) @binding(3) var weight: texture_2d<f32>;      // stored as given
 @group(1) @binding(4) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
 @group(1) @binding(5) var after: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(11) var earlier: texture_2d<f32>;    // stored as rgba16float: what is added for other reasons
+@group(1) @binding(11) var earlier: texture_2d<f32>;    // stored as rgba16float: light added for other reasons
 @group(1) @binding(12) var range: texture_2d<u32>;      // stored as rgba32uint, by `find_range`: the least and the greatest change around, and 1 if a neighbour does not show all of it
 @group(1) @binding(13) var<storage, read_write> from_here: array<u32>;   // see push.wgsl
 @group(1) @binding(14) var<storage, read_write> from_there: array<u32>;
@@ -30,8 +30,8 @@ override WEIGHTED: bool = false;    // multiply by `weight`
 override ONTO: bool = false;        // add to `earlier`
 override TOLD: bool = true;         // how sure it is
 
-const LEAST_COVERED: f32 = 0.05;    // what comes from one frame alone counts less than this close to the instant of the other
-const MOST_CLOSED: f32 = 4.0;       // factor of what covers a part of a pixel where flow is not searched, or seen in colours that rest
+const LEAST_COVERED: f32 = 0.05;    // light from one frame alone counts less than this close to the instant of the other
+const MOST_CLOSED: f32 = 4.0;       // factor of partial coverage where flow is not searched, or where light is seen in static colours
 const LEAST_LIGHT: f32 = 0.005;     // share of the light that the darkest shadow leaves
 const DARKEST: f32 = -3.0;       // change of the logarithm of light where a neighbour does not show it
 const MOST_ADDED: f32 = 60000.0;    // [linear]
@@ -42,7 +42,7 @@ fn step_around(x: f32, half: f32) -> f32 {
     return smoothstep(0.5 - half, 0.5 + half, x);
 }
 
-/// What a frame shows around.
+/// The surroundings in a frame.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_range(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -172,7 +172,7 @@ fn store(px: vec2i, change: vec3f, a: f32) {
     textureStore(added, px, vec4f(clamp(result, vec3f(-MOST_ADDED), vec3f(MOST_ADDED)), a));
 }
 
-/// Darkness as it was pushed here from both frames, and what rests; as a change of the logarithm of light. a: the share of
+/// Darkness as it was pushed here from both frames, and static darkness; as a change of the logarithm of light. a: the share of
 /// both frames' darkness here whose flow is trusted.
 fn pushed(px: vec2i) -> vec4f {
     let first = 2u * (u32(px.y) * frame.size.x + u32(px.x));

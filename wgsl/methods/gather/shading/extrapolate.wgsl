@@ -29,9 +29,9 @@ alias Weighted = texture_storage_2d<rgba32float, write>;
 override COLORS: bool = false;  // the light is the picture itself: its differences may be texture, so that a guess has to explain more
 override SURE: f32 = select(0.5, 0.75, COLORS);             // how much the motion of a body has to explain
 override BODY_CLEARLY: f32 = select(0.83, 0.75, COLORS);    // as CLEARLY, of a body
-override HIDDEN: f32 = select(0.3, 1.0, COLORS);    // share of what differs without motion that counts where a body hides what it is compared with
+override HIDDEN: f32 = select(0.3, 1.0, COLORS);    // share of the difference without motion that counts where a body hides the other place
 
-// Of what rests, unasked, flow has to explain nearly all.
+// On static surfaces, unless requested, flow has to explain nearly all.
 override MISSED: f32 = select(0.85, 0.45, RESTING); // share of the differences without flow from which on it explains nothing,
 override EXPLAINED: f32 = select(0.6, 0.2, RESTING);    // and up to which it explains them
 
@@ -114,7 +114,7 @@ fn motion_of(cell: vec2u, k: u32) -> vec4f {
     return select(1.0, LESS, k % 2u == 1u) * select(nearest, other, k > 1u);
 }
 
-/// What differs around a cell with each of its motions; nothing where there is no shadow in either frame.
+/// The differences around a cell with each of its motions; none where there is no shadow in either frame.
 @compute @workgroup_size(WG_X, WG_Y)
 fn compare_bodies(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_part(group, local, CELL);
@@ -173,7 +173,7 @@ fn body_at(id: vec2u) -> vec2f {
     return select(both.xy, both.zw, side.next == 1u);
 }
 
-/// Differences of what moves from frame to frame.
+/// Differences of moving light from frame to frame.
 @compute @workgroup_size(WG_X, WG_Y)
 fn explain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -224,7 +224,7 @@ fn differs_by(id: vec2u, to: vec2f, was: vec2f, hidden: f32) -> f32 {
         + select(unseen_here, abs(values_at(was).a - other), is_here);
 }
 
-/// True if the surface at `a` is nearer than that at `b`. False where light rests: what is hidden there tells nothing.
+/// True if the surface at `a` is nearer than that at `b`. False where light rests: hidden surfaces are no evidence there.
 fn is_before(a: vec2i, b: vec2i) -> bool {
     return textureLoad(planes, a, 0).x > NEARER * textureLoad(planes, b, 0).x;
 }
@@ -267,7 +267,7 @@ fn choose(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gr
     textureStore(flow_out, id, best);
 }
 
-/// How much is explained, 0 to 1, by what differs with flow and without.
+/// The share of the difference that flow explains, 0 to 1.
 fn explained(found: f32, still: f32) -> f32 {
     return clamp((MISSED - found / max(still, 1e-4)) / (MISSED - EXPLAINED), 0.0, 1.0);
 }
@@ -282,7 +282,7 @@ fn weigh(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) gro
     textureStore(weighted, id, vec4f(weight * own.xy, weight, 0.0));
 }
 
-/// It takes the place of flow around it that explains nothing, within a shadow where nothing differs, if what is there fits.
+/// It takes the place of flow around it that explains nothing, within a shadow where nothing differs, if the light there fits.
 @compute @workgroup_size(WG_X, WG_Y)
 fn settle(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);

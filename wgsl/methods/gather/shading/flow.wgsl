@@ -9,7 +9,7 @@
 @group(1) @binding(0) var here: texture_2d<f32>;        // stored as rgba16float: a level of pyramid.wgsl
 @group(1) @binding(1) var there: texture_2d<f32>;       // stored as rgba16float: its `squares`
 @group(1) @binding(2) var coarse: texture_2d<f32>;      // stored as rgba16float: by `write_flow`, of the coarser level; 1 x 1: there is none
-@group(1) @binding(3) var patches: texture_2d<f32>;     // stored as rgba32float; of `propagate` and `write_flow`: what the pass before wrote
+@group(1) @binding(3) var patches: texture_2d<f32>;     // stored as rgba32float; of `propagate` and `write_flow`: output of the pass before
 @group(1) @binding(4) var patches_out: Patches;         // flow [px], squared difference
 @group(1) @binding(5) var flow_out: Flow;
 
@@ -132,7 +132,7 @@ fn coarse_flow(px: vec2i, last: vec2i) -> vec2f {
     return 2.0 * textureLoad(coarse, near, 0).xy;
 }
 
-/// False for a pixel of a level that is far from all changes. On coarse levels, patches are larger than what is near.
+/// False for a pixel of a level that is far from all changes. On coarse levels, patches are larger than that distance.
 fn counts(px: vec2i) -> bool {
     return IS_COARSE || is_near(in_frame(vec2u(px), textureDimensions(here)));
 }
@@ -162,7 +162,7 @@ fn search(@builtin(global_invocation_id) id: vec3u) {
     textureStore(patches_out, id.xy, vec4f(best.flow, best.found.cost, f32(moves)));
 }
 
-/// Each patch from what its neighbours found.
+/// Each patch from the results of its neighbours.
 @compute @workgroup_size(WG_X, WG_Y)
 fn propagate(@builtin(global_invocation_id) id: vec3u) {
     let size = vec2i(textureDimensions(here));

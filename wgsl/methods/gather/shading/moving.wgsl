@@ -1,4 +1,4 @@
-// What moves over the surfaces, in this frame and in a neighbour, and its flow both ways; read between pixels.
+// Light that moves over the surfaces, in this frame and in a neighbour, and its flow both ways; read between pixels.
 //#include methods/gather/shading/light.wgsl
 
 @group(1) @binding(6) var values: texture_2d<f32>;      // stored as rgba16float, by values.wgsl

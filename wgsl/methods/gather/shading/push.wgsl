@@ -47,7 +47,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
     }
 }
 
-/// What the value of a pixel has become, `along` this share of its flow.
+/// The value of a pixel, `along` this share of its flow.
 fn moved(id: vec2u, value: vec4f, known: vec4f, along: f32) -> Moved {
     let weight = known.z * min(value.a / PRESENT, 1.0);
     let at = vec2f(id) + along * known.xy;

@@ -1,4 +1,4 @@
-// Pictures of what moves, each level half as large as the one before: with their gradients, and for reading between pixels.
+// Pictures of moving light, each level half as large as the one before: with their gradients, and for reading between pixels.
 //#include common/frame.wgsl
 //#include methods/gather/shading/light.wgsl
 //#include methods/gather/shading/listed.wgsl

@@ -3,7 +3,7 @@
 
 @group(1) @binding(21) var<storage, read> found: array<u32>;    // one word, then those of tiles: see active.wgsl
 
-/// True near changes of light. What flow and its means write is known there, and in the tiles beside these.
+/// True near changes of light. The outputs of flow and of its means are known there, and in the tiles beside these.
 fn is_near(px: vec2u) -> bool {
     return (found[1u + light_tile(px)] & NEAR) != 0u;
 }

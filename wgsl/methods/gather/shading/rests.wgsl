@@ -1,6 +1,6 @@
 // Surfaces that rest: nothing but light changes their colours.
 
-override RESTING: bool = false;     // light is the picture itself, on what rests alone: see light_inputs.py
+override RESTING: bool = false;     // light is the picture itself, on static surfaces alone: see light_inputs.py
 
 const RESTS: f32 = 0.05;        // motion below which a surface rests: its texture stays where it is [px]
 const DARK: f32 = 0.02;         // light that is dark [linear]: changes are those of the logarithm of light and this

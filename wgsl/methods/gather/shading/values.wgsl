@@ -7,7 +7,7 @@
 @group(1) @binding(0) var light_here: texture_2d<f32>;  // stored as given
 @group(1) @binding(1) var before: texture_2d<f32>;      // stored as rgba16float: changes to the previous frame, to the next one
 @group(1) @binding(2) var after: texture_2d<f32>;       // stored as rgba16float
-@group(1) @binding(3) var closed: texture_2d<f32>;      // what closing.wgsl wrote
+@group(1) @binding(3) var closed: texture_2d<f32>;      // output of closing.wgsl
 @group(1) @binding(4) var own: texture_2d<f32>;         // changes to the frame that is asked for; black: this one
 @group(1) @binding(5) var values: Values;
 
@@ -30,7 +30,7 @@ fn main(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) grou
         return;
     }
     var brightest = most;
-    if !RESTING {   // there, what is brighter around is another texture
+    if !RESTING {   // there, brighter pixels around are another texture
         brightest = max(most, textureLoad(closed, px, 0).rgb - level);
     }
     let darkness = 1.0 - exp(change - brightest);

@@ -58,7 +58,7 @@ fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
     let first = max(here + max(vec2i(floor(box.xy / f32(TILE) - margin)), vec2i(-MAX_TILE_RADIUS)), vec2i(0));
     let last = min(here + min(vec2i(ceil(box.zw / f32(TILE) + margin)), vec2i(MAX_TILE_RADIUS)), tiles - 1);
     let across = last.x - first.x + 1;
-    // It may move and be back when the shutter opens and closes, so static is what cannot get away at all.
+    // It may move and be back when the shutter opens and closes, so only pixels that cannot get away at all are static.
     // Both components together stay under STATIC_EPSILON.
     let u = max_abs_time(source.offset);
     let farthest = abs(union_with_origin(displacement_box(least, most, u), displacement_box(least, most, -u)));

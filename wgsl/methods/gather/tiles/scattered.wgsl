@@ -1,11 +1,11 @@
-// What is scattered: for the frame and its neighbours, every slice of the exposure and every block of pixels a word that tells the
+// Scattered motions: for the frame and its neighbours, every slice of the exposure and every block of pixels a word that tells the
 // nearest pixel that is in the block by then: its depth, and its place counted from the block's first pixel. 0: none; greater: nearer.
 //#include common/frame.wgsl
 //#include common/shutter.wgsl
 //#include methods/gather/worklist.wgsl
 
 const SLICES: u32 = 16u;            // of the exposure, at most: fewer if there are fewer samples, or no memory for more
-const LEAST_SCATTERED: f32 = 1.0;   // what moves less per frame interval [px] needs no start of its own
+const LEAST_SCATTERED: f32 = 1.0;   // motion of less per frame interval [px] needs no start of its own
 const PLACE_BITS: u32 = 9u;         // of x and y each, as far as motions are followed
 const HALF_PLACE: i32 = 256;        // [px]
 const LOST_BITS: u32 = 17u;         // of a depth, which is known to 1/64 of itself

@@ -15,13 +15,13 @@ struct SourceFrame {
 
 @group(1) @binding(0) var<uniform> source: SourceFrame;
 @group(1) @binding(1) var front_surface: texture_2d<u32>;   // stored as rgba32uint: see pack_surface()
-@group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // what `cluster_motions` wrote
+@group(1) @binding(2) var tile_motions: texture_2d_array<f32>;      // output of `cluster_motions`
 @group(1) @binding(3) var tile_motions_out: Layers;     // of every tile's own pixels, MOTION_LAYERS
 @group(1) @binding(4) var tile_candidates: Packed;      // of all that may come into it, CANDIDATE_LAYERS per frame
 @group(1) @binding(5) var<storage, read_write> max_displacement: atomic<u32>;   // bits of the greatest of all tiles [px]
 @group(1) @binding(6) var<storage, read> active_cells: WorkList;
 @group(1) @binding(7) var<storage, read> static_cells: WorkList;
-@group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // what `coarsen` wrote
+@group(1) @binding(8) var coarse_boxes: texture_2d<f32>;    // output of `coarsen`
 @group(1) @binding(9) var coarse_boxes_out: Boxes;      // around the boxes of COARSE x COARSE tiles
 @group(1) @binding(10) var<storage, read_write> scattering: array<atomic<u32>>; // a WorkList of the tiles of this frame to scatter; then a flag for each; all 0 at first
 
@@ -154,7 +154,7 @@ struct Receiver {       // a tile that gathers, and from where
     last: vec2i,
 }
 
-struct Gathered {       // what comes into a tile
+struct Gathered {       // motions that come into a tile
     motions: array<vec4f, 4>,
     count: u32,         // of the motions
     min_depth: vec4f,   // of each
@@ -264,7 +264,7 @@ fn cluster_what_comes(gathered: ptr<function, Gathered>, tile: Receiver) {
     (*gathered).count = count;
 }
 
-/// The depths and times of each cluster, and what is far from all of them.
+/// The depths and times of each cluster, and the motions far from all of them.
 fn measure_what_comes(gathered: ptr<function, Gathered>, tile: Receiver) {
     let motions = (*gathered).motions;
     var min_depth = vec4f(INFINITE);

@@ -4,10 +4,10 @@
 //#include methods/gather/shading/listed.wgsl
 
 @group(1) @binding(0) var ratio: texture_2d<f32>;       // stored as rgba16float, by measure.wgsl
-@group(1) @binding(1) var scalar: texture_2d<f32>;      // stored as r32float; of `find_gain` and `limit_ratio`: what the pass before wrote
+@group(1) @binding(1) var scalar: texture_2d<f32>;      // stored as r32float; of `find_gain` and `limit_ratio`: output of the pass before
 @group(1) @binding(2) var light_here: texture_2d<f32>;      // stored as given
 @group(1) @binding(3) var albedo: texture_2d<f32>;      // stored as given
-@group(1) @binding(4) var coherence: texture_2d<f32>;   // stored as r32float; of `find_gain`: what `find_coherence` wrote
+@group(1) @binding(4) var coherence: texture_2d<f32>;   // stored as r32float; of `find_gain`: output of `find_coherence`
 @group(1) @binding(5) var ratio_out: Ratio;
 @group(1) @binding(6) var scalar_out: Scalar;
 @group(1) @binding(7) var<storage, read_write> found: FoundTiles;
@@ -27,7 +27,7 @@ const FALLOFF: f32 = 0.5;       // 1 / (2 sigma^2), sigma = 1 px
 const RADIUS: i32 = 3;          // of that Gaussian [px]
 const NARROW_FALLOFF: f32 = 2.0;    // sigma = 0.5 px
 
-/// A Gaussian of half a pixel over what is seen.
+/// A Gaussian of half a pixel over visible pixels.
 @compute @workgroup_size(WG_X, WG_Y)
 fn smooth_ratio(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
@@ -98,7 +98,7 @@ fn find_coherence(@builtin(local_invocation_index) local: u32, @builtin(workgrou
     textureStore(scalar_out, id, vec4f(abs(sum) / max(absolute, 1e-4 * total)));
 }
 
-/// The greatest of 5 x 5, from 0 for what does not count to 1.
+/// The greatest of 5 x 5, from 0 for pixels that do not count to 1.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_gain(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let id = listed_pixel(group, local);
