@@ -25,7 +25,7 @@ from wgmb.settings import METHOD_OPTIONS, OutputSettings, SceneSettings
 from wgmb.settings.groups import GROUPS
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs/development/method-package.md"
+PAGE = ROOT / "docs/development/add-a-method.md"
 
 
 def files_of(page: str) -> dict[str, str]:

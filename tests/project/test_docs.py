@@ -91,7 +91,7 @@ def test_the_pages_that_teach_python_have_blocks():
     taught = {name for name in PAGES if re.fullmatch(r"docs/python/[a-z-]+\.md", name)}
     others = {
         "README.md",
-        "docs/engineers/pygfx.md",
+        "docs/artists/in-other-programs.md",
         "docs/engineers/embedding.md",
         "docs/engineers/flow.md",
     }

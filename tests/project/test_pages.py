@@ -138,8 +138,8 @@ PAGES = {
 
 
 def test_the_pages_have_formulas_contents_and_links_to_places():
-    assert sum(len(formulas(text)) for text in SITE.values()) > 100
-    assert len(contents(SITE)) > 60
+    assert sum(len(formulas(text)) for text in SITE.values()) > 80
+    assert len(contents(SITE)) > 45
     assert len(re.findall(r"\.md#", "".join(PAGES.values()))) > 15
 
 

@@ -90,7 +90,7 @@ def test_a_connection_and_a_program_would_be_seen(tmp_path):
 @pytest.mark.fast
 def test_each_promise_of_the_page_has_a_test_that_exists():
     page = (ROOT / "SECURITY.md").read_text("utf-8")
-    promised = page[page.index("## What is promised") : page.index("How this is tested:")]
+    promised = page[page.index("## Promises") : page.index("How this is tested:")]
     promises = [lead.rstrip(".") for lead in re.findall(r"^- \*\*([^*]+)\*\*", promised, re.M)]
     assert len(promises) >= 7
     rows = dict(re.findall(r"^\| ([^|]+) \| (`[^|]+) \|$", page, re.M))

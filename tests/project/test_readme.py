@@ -26,6 +26,11 @@ def test_python_blocks_run_in_their_order(tmp_path, monkeypatch):
     assert [image.shape for image in names["images"]] == [(240, 400, 4)] * 3
 
 
+def test_the_list_of_the_documentation_is_short():
+    section = TEXT.partition("## Documentation\n")[2].partition("\n## ")[0]
+    assert 0 < len(re.findall(r"\]\(", section)) <= 8
+
+
 SCORED = {
     "a camera moving past thin objects": "a_parallax 180°",
     "fast objects crossing": "c_crossing 180°",
