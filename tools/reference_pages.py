@@ -42,7 +42,7 @@ def scene_table() -> str:
 
 def convention_table() -> str:
     """Values of `--vectors`, as Markdown."""
-    rows = ["| `--vectors` | what the numbers mean |", "|---|---|"]
+    rows = ["| `--vectors` | meaning of the numbers |", "|---|---|"]
     rows += [f"| `{name}` | {_plain(c.about)} |" for name, c in CONVENTIONS.items()]
     return "\n".join(rows) + "\n"
 
