@@ -11,7 +11,7 @@ import pytest
 import make_clips
 import make_frames as make
 
-PAGE = Path(__file__).parents[2] / "docs/reference/automation.md"
+PAGE = Path(__file__).parents[2] / "docs/reference/files.md"
 (SCHEMA,) = re.findall(r"^```json\n(.*?)^```", PAGE.read_text("utf-8"), re.M | re.S)
 VALID = jsonschema.Draft202012Validator(json.loads(SCHEMA))
 

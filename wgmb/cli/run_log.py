@@ -1,6 +1,6 @@
 """`--log-json`: the events of a run for machines, a line of JSON each.
 
-docs/reference/automation.md describes the events. A command opens its log before it does anything
+docs/reference/files.md describes the events. A command opens its log before it does anything
 else, and app.py ends it with the exit code; there is one at most in a process.
 """
 
