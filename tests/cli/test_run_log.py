@@ -12,7 +12,8 @@ import make_clips
 import make_frames as make
 
 PAGE = Path(__file__).parents[2] / "docs/reference/files.md"
-(SCHEMA,) = re.findall(r"^```json\n(.*?)^```", PAGE.read_text("utf-8"), re.M | re.S)
+SECTION = PAGE.read_text("utf-8").partition("\n### Schema\n")[2]
+(SCHEMA,) = re.findall(r"^```json\n(.*?)^```", SECTION, re.M | re.S)
 VALID = jsonschema.Draft202012Validator(json.loads(SCHEMA))
 
 
