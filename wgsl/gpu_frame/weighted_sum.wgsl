@@ -14,7 +14,7 @@
 @group(1) @binding(9) var<storage, read_write> sums: array<vec4f>;
 @group(1) @binding(10) var output: Output;
 
-// Not a uniform: lavapipe would compile the shader anew at every dispatch, and keep it (lavapipe.md).
+// Not a uniform: lavapipe would compile the shader anew at every dispatch, and keep it (wgsl.md).
 override FIRST: bool = true;    // `sums` is empty
 
 struct Share {

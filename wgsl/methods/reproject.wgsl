@@ -57,7 +57,7 @@ fn splat_depths(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     var bits = 0u;
-    loop {      // loop form: see lavapipe.md
+    loop {      // loop form: see wgsl.md
         let k = firstTrailingBit(slices);
         let x = position(sample, k);
         for (var i = 0u; i < 4u; i++) {

@@ -50,7 +50,7 @@ override NEAREST_ONLY: bool = false;    // of the samples on a pixel only the ne
 const STEPS_PER_UNIT: f32 = 16384.0;
 const LARGEST: f32 = 262143.0;      // colour is clamped to 0..LARGEST [linear]
 const UNIT: u32 = 1024u;            // weight of a sample that is on one pixel for a whole step
-const MOST: u32 = 60000u;           // samples in one pixel's list: loops end soon after, see lavapipe.md
+const MOST: u32 = 60000u;           // samples in one pixel's list: loops end soon after, see wgsl.md
 const ROWS: u32 = 17u;              // steps of a chunk, and one more at which a line ends
 const LONGEST: f32 = 4000.0;        // line of one step [px]; the points of longer ones have gaps
 
@@ -84,7 +84,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3u) {
     var low = vec4u(0u);
     var high = vec4u(0u);
     var count = 0u;
-    let before_first = turns_of(select(4u, 0u, chunk.first == 1u), id.x);   // a branch saves nothing, see lavapipe.md
+    let before_first = turns_of(select(4u, 0u, chunk.first == 1u), id.x);   // a branch saves nothing, see wgsl.md
     for (var c = 0u; c < before_first; c++) {
         low[c] = atomicLoad(&sums[4u * at + c]);
         high[c] = atomicLoad(&carries[4u * at + c]);

@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if !CURVED { trajectory.half_acceleration = vec2f(0.0); }
     if PUBLISHED { trajectory = Trajectory(-textureLoad(motion, id.xy, 0).xy, vec2f(0.0)); }
 
-    // Static pixels take no taps. Loop form: see lavapipe.md.
+    // Static pixels take no taps. Loop form: see wgsl.md.
     let shift = frame.jitter * (pixel_noise(id.xy) - 0.5);
     let all = shutter_times(x, shift);
     let opens = shutter.span.x + all.delay;

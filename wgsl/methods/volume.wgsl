@@ -9,7 +9,7 @@
 @group(1) @binding(2) var<storage, read> tiles: array<vec2u>;  // of the workgroups: their places in the image, in workgroups
 @group(1) @binding(3) var output: Output;
 
-// The tiles that a volume, or a shadow, can reach are known before the dispatch. Loop form: see lavapipe.md.
+// The tiles that a volume, or a shadow, can reach are known before the dispatch. Loop form: see wgsl.md.
 override CLOUD: bool = true;
 override SHADOW: bool = true;
 

@@ -97,7 +97,7 @@ fn camera_ray(x: vec2f, camera: Pose) -> Ray {
 }
 
 /// The nearest hit of a ray. Poses are expensive to fetch and a ray passes near few bodies, so their
-/// bounds are tested first, 32 bodies at a time with a bit each. Loop form: see lavapipe.md.
+/// bounds are tested first, 32 bodies at a time with a bit each. Loop form: see wgsl.md.
 fn nearest(ray: Ray, now: Instant) -> Hit {
     var hit = Hit(BACKGROUND_DEPTH, 0u, Pose());
     let boxes = scene.spheres;

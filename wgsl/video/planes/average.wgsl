@@ -97,7 +97,7 @@ fn main(
         n++;
         if n >= turns { break; }
     }
-    if rows.x > rows.y { return; }      // outside; not before the loop, see lavapipe.md
+    if rows.x > rows.y { return; }      // outside; not before the loop, see wgsl.md
     if !FIRST {
         upper = with_sums(upper, 8u * place);
         lower = with_sums(lower, 8u * place + 4u);

@@ -22,7 +22,7 @@ override PLAIN: bool = false;       // the blocks have one layer at all times, o
 
 const MAX_MISS: f32 = 8.0;              // if no search along the pixel's own path comes nearer than this [px], the surface there is hidden
 
-// Loops are left from their end, and rare cases have a loop of their own over bits of times: see lavapipe.md.
+// Loops are left from their end, and rare cases have a loop of their own over bits of times: see wgsl.md.
 
 struct Pixel {          // common to all times of a pixel
     x: vec2f,           // its centre [px]

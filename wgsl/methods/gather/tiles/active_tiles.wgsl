@@ -97,7 +97,7 @@ fn find_distances(@builtin(global_invocation_id) id: vec3u) {
 fn build_worklists(@builtin(local_invocation_index) local: u32, @builtin(workgroup_id) group: vec3u) {
     let place = group.x * WG_X * WG_Y + local;
     let cells = cells_of(frame.size);
-    // Nothing returns before these loops: see lavapipe.md.
+    // Nothing returns before these loops: see wgsl.md.
     let width = select(0u, cells.x, place < cells.y);
     let row = interleaved_row(min(place, cells.y - 1u), cells.y);
     var active_count = 0u;
