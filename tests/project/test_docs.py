@@ -15,6 +15,7 @@ import cyclopts
 import numpy as np
 import pytest
 import reference_pages
+import scores_page
 
 import make_clips
 import wgmb
@@ -217,6 +218,24 @@ def test_a_constant_that_is_gone_is_noticed(name):
     path = "wgsl/methods/gather/search/visibility.wgsl"
     assert defined(f"{path}:GOES_ON") and not defined(f"{path}:{name}")
     assert not defined(f"wgsl/none.wgsl:{name}")
+
+
+@pytest.mark.fast
+def test_a_tool_writes_its_part_of_the_scores_and_nothing_else(tmp_path, monkeypatch):
+    text = PAGES["docs/laboratory/scores.md"]
+    monkeypatch.setattr(scores_page, "PAGE", tmp_path / "scores.md")
+    scores_page.PAGE.write_text(text, "utf-8")
+    names = re.findall(r"<!-- end of (.+) -->", text)
+    assert len(names) > 3
+    for name in names:
+        assert "\n| ---" in scores_page.part(name)
+        scores_page.write(name, scores_page.part(name))
+    assert scores_page.PAGE.read_text("utf-8") == text
+    scores_page.write(names[0], scores_page.table([["a", "b"], ["1", "2"]]))
+    assert scores_page.part(names[0]) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n\n"
+    assert scores_page.part(names[1]) in text
+    with pytest.raises(ValueError, match="must have <!-- none -->"):
+        scores_page.part("none")
 
 
 WRITING = re.compile(r"^wgmb .* -o ('[^']*'|\S+)", re.M)
