@@ -8,6 +8,9 @@ import pytest
 import make_frames as make
 from wgmb import InputError
 from wgmb.files import bounded
+from wgmb.io import atomic, exr, stills
+from wgmb.run.job_file import read_job
+from wgmb.settings.toml import text_of
 
 
 @pytest.fixture(autouse=True)
@@ -47,6 +50,30 @@ def test_what_is_no_regular_file_of_a_bounded_size_is_refused(tmp_path, what, me
     path = spoiled(tmp_path / "a.csv", what)
     with pytest.raises(InputError, match=rf"a\.csv: {message}"):
         bounded.read(path, 1 << 20, "a curve")
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [("pipe", "is a pipe or a device"), ("folder", "is a folder, not a file"),
+     ("link", "is a pipe or a device"), ("none", "no such file")],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["a.exr", "a.png", "a.toml", "a.json"])
+def test_what_is_there_instead_of_a_file_is_named(tmp_path, what, message, name):
+    path = tmp_path / name if what == "none" else spoiled(tmp_path / name, what)
+    readers = {".exr": exr.read, ".png": stills.read, ".toml": text_of, ".json": read_job}
+    with pytest.raises(InputError, match=rf"{name}: {message}"):
+        readers[path.suffix](path)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("what", ["pipe", "folder", "link"])
+def test_what_is_no_file_is_not_replaced(tmp_path, what):
+    path = spoiled(tmp_path / "a.png", what)
+    with pytest.raises(OSError, match="exists and is not a file"):
+        atomic.write_file(path, b"picture")
+    assert not path.is_file()
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.fast

@@ -180,6 +180,19 @@ def test_workers_that_are_stopped_hold_back_no_end(place, shot, to_all):
     place.check(process, signal.SIGTERM)
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=FULL)])
+def test_workers_that_are_still_starting_hold_back_no_end(place, shot, number):
+    """The process that they are forked from loads its modules, and hears nothing meanwhile."""
+    line = "blur", shot, "-o", place.out / "o.####.exr", "--vectors", "blender", "--workers", 2
+    process = place.run(lambda: has_forker(place), *line)
+    place.check(process, number)
+
+
+def has_forker(place) -> bool:
+    """Return True once the connection of the process that forks workers is there."""
+    return any(place.temporary.glob("pymp-*/listener-*"))
+
+
 def ignore_hangups():
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
 

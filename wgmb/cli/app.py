@@ -141,6 +141,7 @@ def _code(words: list[str]) -> int:
     except MemoryError:
         return _say_why("not enough memory", SOME_FAILED)
     except KeyboardInterrupt:
+        interruption.expect_no_message()
         return _say_why("interrupted", INTERRUPTED)
     except Exception as error:
         if (why := _device_error(error)) is None:

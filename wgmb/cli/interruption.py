@@ -20,7 +20,7 @@ from .exit_codes import INTERRUPTED
 
 GRACE = 3.0  # seconds
 _REMOVING = 1.0  # seconds, after these
-_said: list[bool] = []  # not empty once the command has said that it was interrupted
+_said: list[bool] = []  # not empty once the command says that it was interrupted
 
 
 def watch() -> None:
@@ -38,16 +38,20 @@ def watch() -> None:
     begin(follow, "signals")
 
 
-def finish() -> None:
-    """Remove the leftovers of a command that has reported its interruption."""
+def expect_no_message() -> None:
+    """Leave the message to the command, which reports its interruption now."""
     _said.append(True)
+
+
+def finish() -> None:
+    """Remove the leftovers of a command that was interrupted."""
     leftovers.remove_all(_REMOVING)
 
 
 def end() -> None:
     """Remove unfinished files, say so, and end the process now."""
     try:
-        leftovers.remove_all(_REMOVING)
+        leftovers.remove_all(_REMOVING, is_last=True)
         if not _said:
             begin(lambda: terminal.complain("interrupted"), "last words").join(0.2)
     finally:

@@ -35,6 +35,13 @@ def read(path: Path, most: int, kind: str) -> bytes:
     return data
 
 
+def missing(path: Path) -> InputError:
+    """The error for a path where a regular file was expected: what is there instead."""
+    if path.is_dir():
+        return InputError(f"{path}: is a folder, not a file")
+    return InputError(f"{path}: {'is a pipe or a device' if path.exists() else 'no such file'}")
+
+
 def _without_waiting(path: str, flags: int) -> int:
     """Open a file that may have become a pipe since it was looked at."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

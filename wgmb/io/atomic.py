@@ -133,10 +133,13 @@ def remove(temporary: Path) -> None:
 def rename(temporary: Path, path: Path, *, is_new: bool = False) -> None:
     """Give a finished file its name, and wait until the folder is on disk.
 
-    `is_new`: raises FileExistsError where there is anything under that name.
+    Raises FileExistsError where something else than a file has it, such as a pipe or a device; if
+    it `is_new`, where there is anything under that name.
     """
     if is_new and os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, "was written by another process during this run")
+    if path.exists() and not path.is_file():
+        raise FileExistsError(errno.EEXIST, "exists and is not a file")
     os.replace(temporary, path)
     leftovers.forget(temporary)
     if os.name == "nt":  # folders cannot be opened there

@@ -17,6 +17,7 @@ import numpy as np
 import OpenEXR
 
 from ..errors import InputError, check_choice
+from ..files import bounded
 from . import chroma, deep, exr_headers, limits, lossy
 from .exr_library import hushed, inside
 from .limits import MOST_PIXELS_A_SIDE
@@ -109,7 +110,7 @@ def read(
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise bounded.missing(path)
     with inside():
         header, unknown = _open(path, header_only=True)
     try:

@@ -15,6 +15,7 @@ from ..threads import begin
 _ONE = 0.5  # seconds that one of them may take: its disk may not answer
 
 _removals: dict[Hashable, Callable[[], object]] = {}
+_last: dict[Hashable, Callable[[], object]] = {}
 _is_over: list[bool] = []  # not empty once all are removed
 
 
@@ -26,6 +27,11 @@ def add(key: Hashable, remove: Callable[[], object]) -> None:
     _removals[key] = remove
     if _is_over:
         raise KeyboardInterrupt
+
+
+def add_last(key: Hashable, remove: Callable[[], object]) -> None:
+    """The same for what Python removes by itself, unless the process ends without that."""
+    _last[key] = remove
 
 
 def forget(key: Hashable) -> None:
@@ -44,11 +50,15 @@ def removed_by(remove: Callable[[], object]) -> Iterator[None]:
         forget(key)
 
 
-def remove_all(seconds: float) -> None:
-    """Remove them, in so many seconds at most; nothing can be begun from now on."""
+def remove_all(seconds: float, *, is_last: bool = False) -> None:
+    """Remove them, in so many seconds at most; nothing can be begun from now on.
+
+    `is_last`: the process ends now, without what Python does at its end.
+    """
     _is_over.append(True)
     until = time.monotonic() + seconds
-    for remove in reversed(list(_removals.values())):
+    removals = [*(_last.values() if is_last else ()), *_removals.values()]
+    for remove in reversed(removals):
         rest = until - time.monotonic()
         if rest <= 0:
             return

@@ -20,6 +20,7 @@ from ..color.spaces import ColorSpace
 from ..color.srgb import ToDisplay, linear, to_display
 from ..errors import InputError
 from ..extras import needed_by
+from ..files import bounded
 from . import limits, stated
 from .record import KEY
 from .suffixes import STILLS
@@ -79,7 +80,7 @@ def samples(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
 def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """The file's samples, converted; every failure is an InputError that names the file."""
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise bounded.missing(path)
 
     def allow(width: int, height: int, segments: int) -> None:
         if width < 1 or height < 1:

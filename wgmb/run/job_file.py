@@ -117,7 +117,7 @@ def _with_config(job: Job) -> BlurRequest:
 def read_job(path: Path) -> Stored:
     """The job in a file; InputError in one line if it is none, damaged, or of another wgmb."""
     if not readable(path):
-        raise InputError(f"{path}: no such file")
+        raise bounded.missing(path)
     try:
         text = bounded.read(path, _MOST_BYTES, "a job").decode()
     except UnicodeDecodeError:

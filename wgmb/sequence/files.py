@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from ..errors import InputError, did_you_mean
+from ..files import bounded
 from ..io import exr
 from ..io.frame_numbers import (
     MOST_FRAMES,
@@ -134,7 +135,7 @@ class SequenceFiles:
         if not self.is_sequence:
             path = Path(self._leading)
             if not readable(path):
-                raise InputError(f"{path}: no such file")
+                raise bounded.missing(path)
             return [number_in(path)]
         return list(self._settled.on_disk if self._settled else numbers_on_disk(self._leading))
 

@@ -16,7 +16,7 @@ _MOST_BYTES = 1 << 20
 def text_of(path: Path) -> str:
     """The text of a settings file; InputError names it and says why it cannot be read."""
     if not readable(path):
-        raise InputError(f"{path}: no such file")
+        raise bounded.missing(path)
     try:
         return bounded.read(path, _MOST_BYTES, "settings").decode()
     except UnicodeDecodeError:

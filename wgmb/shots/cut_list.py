@@ -79,7 +79,7 @@ class CutList:
             return frozenset(frame_numbers(self._plain, "cuts"))
         path, fps = Path(found["path"]), _rate(found["fps"], self._plain)
         if not readable(path):
-            raise InputError(f"{path}: no such file")
+            raise bounded.missing(path)
         read = _read_edl if found["kind"].lower() == "edl" else _read_otio
         edges = read(path, bounded.read(path, _MOST_BYTES, "an edit"), fps)
         begin, end = min(edges), max(edges)

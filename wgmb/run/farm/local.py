@@ -49,7 +49,7 @@ _QUIET: dict[str, Any] = {
 _LOADED_ONCE = ["wgpu.backends.wgpu_native", "wgmb.run.farm.preloaded"]
 _CLOSING = 5.0  # seconds
 _KILLING = 0.4  # seconds until a killed process is gone
-_TRIES = 3  # of removing a folder, into which a process may write meanwhile
+_TRIES = 3  # of removing a folder
 _STARTING = 20.0  # seconds, after all processes have begun
 _LOOKING = 0.3  # seconds between two looks at whether one is lost
 _MOST_LOST = 3  # for each worker, until the run is given up
@@ -72,10 +72,12 @@ def local_client(count: int) -> Iterator[Any]:
         dask.config.set({**settings, "temporary-directory": folder}),
         _environment(),
     ):
+        leftovers.forget(_end_processes)  # it is the newest one from now on
+        leftovers.add(_end_processes, _end_processes)
+        leftovers.add_last(get_temp_dir(), lambda: _remove(get_temp_dir()))
         if method == "forkserver":
             _load_once()
         cluster = cluster_of(
-            count,
             Encryption.temporary(),
             env=dict(os.environ),  # that of the first process that loaded modules may be older
         )
@@ -84,6 +86,7 @@ def local_client(count: int) -> Iterator[Any]:
             leftovers.removed_by(lambda: kill(cluster)),
             closing(Client(cluster, set_as_default=False)) as client,
         ):
+            cluster.scale(count)  # not before: an interruption ends what is in the cluster
             _wait_for(cluster, client, count)
             yield client
 
@@ -115,12 +118,15 @@ def _load_once() -> None:
 def kill(cluster: Any, address: str | None = None) -> None:
     """End the process of the worker at an address, or of all, whatever they are doing.
 
-    The cluster starts another one in its place, unless it is closed.
+    The cluster starts another one in the place of one.
     """
     import psutil
 
     nannies = [n for n in cluster.workers.values() if address in (None, n.worker_address)]
     processes = []
+    if address is None:
+        for nanny in nannies:
+            nanny.close_gracefully()
     for number in filter(None, (nanny.pid for nanny in nannies)):
         with suppress(psutil.Error):
             processes.append(psutil.Process(number))
@@ -128,13 +134,29 @@ def kill(cluster: Any, address: str | None = None) -> None:
     psutil.wait_procs(processes, timeout=_KILLING)
 
 
+def _end_processes() -> None:
+    """Kill the workers and the process that they are forked from, at the end of the program.
+
+    They would end by themselves, but only once they have loaded their modules. The tracker of
+    multiprocessing's semaphores removes these when all others are gone.
+    """
+    import psutil
+
+    processes = []
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            if not any("resource_tracker" in word for word in process.cmdline()):
+                process.kill()
+                processes.append(process)
+    psutil.wait_procs(processes, timeout=_KILLING)
+
+
 def _remove(folder: str) -> None:
-    """Remove the folder of a run's workers, and that of their process's connection."""
-    for place in (folder, get_temp_dir()):
-        for _ in range(_TRIES):
-            rmtree(place, ignore_errors=True)
-            if not os.path.lexists(place):
-                break
+    """Remove a folder, into which a process may write meanwhile."""
+    for _ in range(_TRIES):
+        rmtree(folder, ignore_errors=True)
+        if not os.path.lexists(folder):
+            break
 
 
 @contextmanager

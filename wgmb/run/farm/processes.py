@@ -31,8 +31,8 @@ class LocalNanny(Nanny):
         super().__init__(*arguments, worker_class=LocalWorker, **named)
 
 
-def cluster_of(count: int, security: Any, **worker: Any) -> SpecCluster:
-    """A scheduler in this process, and so many workers of one thread in processes of their own.
+def cluster_of(security: Any, **worker: Any) -> SpecCluster:
+    """A scheduler in this process, which can be scaled: workers of one thread in own processes.
 
     `worker`: further options of Nanny.
     """
@@ -42,7 +42,6 @@ def cluster_of(count: int, security: Any, **worker: Any) -> SpecCluster:
     return SpecCluster(
         scheduler={"cls": LocalScheduler, "options": {**common, "port": 0, "dashboard": False}},
         worker=spec,
-        workers=dict.fromkeys(range(count), spec),
         security=security,
         **_SILENT,
     )

@@ -97,7 +97,7 @@ class CameraFile:
 def _read_json(path: Path) -> dict[float, dict[str, Any]]:
     try:
         if not path.is_file():
-            raise InputError(f"{path}: no such file")
+            raise bounded.missing(path)
         content = json.loads(bounded.read(path, _MOST_BYTES, "a camera file"))
         frames = content["frames"]
         numbered = {float(k): v for k, v in frames.items()}

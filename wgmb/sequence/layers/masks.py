@@ -13,6 +13,7 @@ import numpy as np
 
 from ...color.srgb import srgb
 from ...errors import InputError, size_text
+from ...files import bounded
 from ...io import exr, stills
 from ...io.frame_numbers import frame_path, in_view, is_pattern, numbers_on_disk, readable
 from ..data_windows import laid
@@ -89,7 +90,7 @@ class Masks:
                     if is_pattern(path):
                         numbers_on_disk(path)
                     elif not readable(path):
-                        raise InputError(f"{path}: no such file")
+                        raise bounded.missing(path)
         for mask in self._by_name:
             if error := self._why_missing(mask):
                 raise error

@@ -14,6 +14,7 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from ...errors import InputError
+from ...files import bounded
 from ...io import limits, watch
 from ...io.frame_numbers import readable
 from .boxes import boxes, check_counts
@@ -77,7 +78,7 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
 def size_of(path: Path) -> int:
     """The length of a file in bytes; InputError in one line where there is nothing to read."""
     if not readable(path):
-        raise InputError(f"{path}: {'is not a file' if path.exists() else 'no such file'}")
+        raise bounded.missing(path)
     if not (stored := path.stat().st_size):
         raise InputError(f"{path}: is empty")
     return stored
