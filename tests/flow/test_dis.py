@@ -91,7 +91,7 @@ def slow_depth(way):
     step = max(1, max(width, height) // 40)
     y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
     points = np.stack([x.ravel(), y.ravel()], 1).astype(float)
-    most, _ = cv2.findHomography(points, points + way[y, x].reshape(-1, 2), cv2.RANSAC, 3.0)
+    most, _ = cv2.findHomography(points, points + way[y, x].reshape(-1, 2), cv2.LMEDS)
     y, x = np.mgrid[:height, :width].astype(float)
     there = np.stack([x, y, np.ones_like(x)], 2) @ most.T
     off = there[..., :2] / there[..., 2:] - np.stack([x, y], 2) - way

@@ -6,6 +6,7 @@ States are (height, width, 4) to_prev, to_next [px of their level].
 from __future__ import annotations
 
 import importlib
+from copy import copy
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ SMALL, HALF = 160, 320  # px along the longer side: where blocks are searched, a
 BLOCK, SPACING = 8, 4  # px of a block, and from one to the next
 MOST_BLOCKS = 400  # of a picture: those that fit worst
 REACH = 0.2  # of the longer side: how far a block is looked for
-SUBPIXEL = 1 / 16  # share of the texture that an error of a part of a pixel leaves as a difference
+SOFT = 0.8  # px of a Gaussian, so that an error of a part of a pixel hardly shows in texture
 UNFIT = 7.0  # levels of 255 of difference to the better neighbour, in the mean of 3 x 3 pixels
 CHANGED = 10.0  # levels by which such a place must differ from both neighbours, beyond noise
 NOISE = 10  # percentile of these differences that is taken for noise
@@ -83,19 +84,19 @@ class Reduced:
         better, worse = self.differences(state)
         return _cv().blur(better + OTHER * _cv().min(worse, MOST_OTHER), (3, 3))
 
-    def _texture(self) -> np.ndarray:
-        """Levels from the darkest to the brightest of 3 x 3 pixels, averaged over 3 x 3 again."""
-        around = np.ones((3, 3), np.uint8)
-        levels = _cv().dilate(self.here, around) - _cv().erode(self.here, around)
-        return _cv().blur(levels, (3, 3))
+    def softened(self) -> Reduced:
+        """The same without the finest texture, in which errors of a part of a pixel show most."""
+        soft = copy(self)
+        soft.here = _cv().GaussianBlur(self.here, (0, 0), SOFT)
+        soft.sides = {k: _cv().GaussianBlur(p, (0, 0), SOFT) for k, p in self.sides.items()}
+        return soft
 
     def unfit(self, state: np.ndarray) -> np.ndarray:
         """Levels by which places that change fit neither neighbour, 0 for all others."""
         better, _ = self.differences(state)
         changes = [_cv().absdiff(self.here, other) for other in self.sides.values()]
         changes = _cv().blur(np.minimum.reduce(changes), (3, 3))
-        explained = UNFIT + SUBPIXEL * self._texture()
-        is_there = (better > explained) & (changes > CHANGED + np.percentile(changes, NOISE))
+        is_there = (better > UNFIT) & (changes > CHANGED + np.percentile(changes, NOISE))
         return np.where(is_there, better, 0)
 
 
@@ -110,12 +111,13 @@ class Blocks(NamedTuple):
 def searched(pictures: Pictures, motion: np.ndarray) -> Blocks | None:
     """A state of a level, with what blocks find where `motion` fits neither neighbour.
 
-    `motion`: of the picture (height, width, 4) [px]. None where it fits, or blocks find the same.
+    `motion`: of the picture (height, width, 4) [px]. None where it fits, where blocks find the
+    same, and in a picture that is smaller than a block.
     """
     small = Reduced(pictures, SMALL)
     begin = scaled(motion, small)
-    unfit = small.unfit(begin)
-    if not unfit.any():
+    unfit = small.softened().unfit(begin)
+    if min(small.size) < BLOCK or not unfit.any():
         return None
     rows, columns = (n // SPACING for n in small.here.shape)
     grid = _cv().resize(unfit, (columns, rows), interpolation=_cv().INTER_AREA)

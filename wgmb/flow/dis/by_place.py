@@ -10,6 +10,7 @@ import numpy as np
 
 from .blocks import Reduced, raised, searched
 from .cost import is_better
+from .dominant import settled
 from .inverse_search import Dis, DisShot, Load, Pictures
 
 TILE = 16  # px
@@ -53,7 +54,7 @@ class ByPlace:
         """That of a picture, (height, width) uint8, between its neighbours; one may lack."""
         here = pictures[1]
         assert here is not None
-        motion = self._quick.motion(pictures)
+        motion = settled(pictures, self._quick.motion(pictures))
         wanted = uneven(motion, UNEVEN)
         found = searched(pictures, motion)
         if found is not None:
@@ -72,7 +73,7 @@ class ByPlace:
                 one = np.where(is_better(part, one, other, MARGIN)[..., None], other, one)
             there = takes[box].astype(bool)
             motion[box][there] = one[there]
-        return motion
+        return settled(pictures, motion)
 
 
 def uneven(motion: np.ndarray, least: float) -> np.ndarray:

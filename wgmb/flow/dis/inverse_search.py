@@ -18,6 +18,7 @@ import numpy as np
 from ... import extras
 from ...color.srgb import to_display
 from ...errors import InputError
+from .homographies import homography_of, ways_of
 
 QUALITIES = ("fast", "best")
 _LEAST = 32  # pixels a side below which OpenCV fails; smaller pictures are continued
@@ -105,22 +106,10 @@ class Dis:
 
         Pixels that do not move like most of the picture are nearer.
         """
-        height, width = way.shape[:2]
-        step = max(1, max(width, height) // 40)
-        y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
-        points = np.stack([x.ravel(), y.ravel()], 1).astype(np.float64)
-        moved = points + way[y, x].reshape(-1, 2)
-        most = np.eye(3)
-        if len(points) >= 4:
-            fitted, _ = self._cv2.findHomography(points, moved, self._cv2.RANSAC, 3.0)
-            most = most if fitted is None else fitted
-        # In place: the pages of large arrays cost as much as the arithmetic.
-        y, x = np.arange(height, dtype=np.float32)[:, None], np.arange(width, dtype=np.float32)
-        across, down, scale = (a * x + (b * y + c) for a, b, c in most.astype(np.float32))
-        for off, place, moved in ((across, x, way[..., 0]), (down, y, way[..., 1])):
-            off /= scale
-            off -= place
-            off -= moved
+        y, x = (np.arange(n, dtype=np.float32) for n in way.shape[:2])
+        across, down = ways_of(homography_of(way), x, y[:, None])
+        across -= way[..., 0]
+        down -= way[..., 1]
         np.hypot(across, down, out=across)
         across *= _APART
         across += 1

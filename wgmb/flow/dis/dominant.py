@@ -1,0 +1,67 @@
+"""The dominant motion of a picture, a homography, which counts wherever it fits as well."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from .blocks import BLOCK, HALF, UNFIT, Reduced, scaled, way_of
+from .homographies import homography_of, ways_of
+from .inverse_search import Pictures
+
+_APART = 0.5  # px of the level, by which a motion differs that is not the dominant one
+
+
+def _cv() -> Any:
+    """OpenCV, which is optional."""
+    return importlib.import_module("cv2")
+
+
+def settled(pictures: Pictures, motion: np.ndarray) -> np.ndarray:
+    """The motion, with the dominant one in regions that differ from it and fit it as well.
+
+    On flat ground and in patterns that repeat, a search finds one motion as well as another. A
+    region keeps its motion if the dominant one fits worse anywhere in it, and so does a picture
+    that is smaller than a block.
+    `motion`: of the picture (height, width, 4) [px], which is changed.
+    """
+    level = Reduced(pictures, HALF)
+    if min(level.size) < BLOCK:
+        return motion
+    level = level.softened()
+    state = scaled(motion, level)
+    dominant = [homography_of(way_of(motion, side)) for side in (0, 1)]
+    columns, rows = (np.arange(n, dtype=np.float32) for n in level.size)
+    x, y = ((n + 0.5) * np.float32(level.factor) - 0.5 for n in (columns, rows))
+    led = [plane for matrix in dominant for plane in ways_of(matrix, x, y[:, None])]
+    calm = np.stack(led, axis=2) / np.float32(level.factor)
+    differs = np.abs(state - calm).max(axis=2) > _APART
+    worse = level.differences(calm)[0] - level.differences(state)[0] > UNFIT
+    _, labels, boxes, _ = _cv().connectedComponentsWithStats(differs.astype(np.uint8))
+    keeps = np.zeros(len(boxes), bool)
+    keeps[labels[worse]] = keeps[0] = True
+    for label in np.flatnonzero(~keeps):
+        _put(motion, dominant, level, labels == label, boxes[label])
+    return motion
+
+
+def _put(
+    motion: np.ndarray,
+    dominant: list[np.ndarray],
+    level: Reduced,
+    there: np.ndarray,
+    box: np.ndarray,
+) -> None:
+    """Write the dominant motion where a plane of the level, within its box, is true."""
+    left, top, wide, high = box[:4].tolist()
+    part = there[top : top + high, left : left + wide].astype(np.uint8)
+    (y0, y1), (x0, x1) = (
+        (round(first * level.factor), min(round((first + n) * level.factor), size))
+        for first, n, size in ((top, high, motion.shape[0]), (left, wide, motion.shape[1]))
+    )
+    whole = _cv().resize(part, (x1 - x0, y1 - y0), interpolation=_cv().INTER_NEAREST) > 0
+    x, y = (np.arange(a, b, dtype=np.float32) for a, b in ((x0, x1), (y0, y1)))
+    led = [plane for matrix in dominant for plane in ways_of(matrix, x, y[:, None])]
+    np.copyto(motion[y0:y1, x0:x1], np.stack(led, axis=2), where=whole[..., None])
