@@ -1,10 +1,10 @@
 """Blurs of recorded clips against their own pictures: python tools/real_clips.py FOLDER [CLIP ...]
 
-Prints the table of docs/laboratory/recorded-clips.md. FOLDER holds the clips of CLIPS, each under
-the name of its file; see that page for where they are from. A clip whose motion is small is thinned
-to every 4th or 8th picture. The truth of a picture that is kept is the mean, in linear light, of
-those around it over half of the interval, the first and the last by half. Every result goes through
-the same 8-bit YUV 4:4:4 as FFmpeg's minterpolate works in. `--frames 2` blurs two successive
+Prints the table of recorded clips in docs/laboratory/scores.md. FOLDER holds the clips of CLIPS,
+each under the name of its file; that page has their sources. A clip whose motion is small is
+thinned to every 4th or 8th picture. The truth of a kept picture is the mean, in linear light, of
+the pictures around it over half of the interval, the first and the last by half. Every result goes
+through the 8-bit YUV 4:4:4 in which FFmpeg's minterpolate works. `--frames 2` blurs two successive
 pictures and adds flicker: the mean change of the error from one to the next, in levels of 255.
 `--crops FOLDER` writes the pictures. Takes minutes on a GPU, three quarters of an hour without.
 """
@@ -58,7 +58,7 @@ CLIPS = {
     "coffee, unseen": Clip("04_coffee.mp4", 100, 4),
     "two people, unseen": Clip("cam04.mp4", 48, 4),
 }
-"""`bottles` and those that are called unseen were looked at only when all was done."""
+"""`bottles` and the unseen clips were held out; docs/laboratory/conclusions.md has exceptions."""
 
 Pictures = dict[int, np.ndarray]
 """Linear pictures (height, width, 3) by number, 0 the one in the middle."""
