@@ -15,13 +15,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .camera import Reprojections, Window, window_of
-from .errors import InputError
+from .errors import InputError, check_choice
 from .gpu import wgsl
 from .png import show
 
@@ -96,6 +96,10 @@ class Frame:
     """(height, width, 3) float, linear: light reflected by gloss, before `glossy_color`."""
     glossy_color: Floats | None = None
     """(height, width, 3) float, linear: the colour of glossy surfaces."""
+    wrap: Literal["off", "on"] = "off"
+    """on: a whole equirectangular panorama of 360 degrees, whose left and right edge are one
+    meridian. Motion across it is taken by the short way, and what leaves one edge comes in from
+    the other."""
     bad: dict[str, int] = field(init=False, default_factory=dict)
     """Number of pixels per input that are not finite, or have no depth in front of the camera.
 
@@ -129,6 +133,9 @@ class Frame:
             ids = ids if ids.dtype.itemsize <= 4 else np.minimum(ids, 2**32 - 1)
             ids = _shaped("object_id", ids, color.shape[:2]).astype(np.uint32, copy=False)
             object.__setattr__(self, "object_id", ids)
+        check_choice("`wrap`", self.wrap, ("off", "on"))
+        if self.camera is not None and self.wrap == "on":
+            raise InputError("a panorama takes no camera: that is for perspective and orthographic")
         if self.camera is not None and self.depth is None:
             raise InputError("motion from a camera needs depth")
         object.__setattr__(self, "window", window_of(self.window, self.camera))

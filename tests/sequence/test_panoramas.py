@@ -1,12 +1,14 @@
 """Panoramas of 360 degrees: a body over the seam is as right as one in the middle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import wgmb
 from make_frames import add_attributes, write_exr
 from wgmb.flow.dis import Dis
-from wgmb.sequence import panorama
+from wgmb.sequence import panorama_signs
 from wgmb.sequence.layers.passes import Passes
 
 WIDTH, HEIGHT = 256, 128
@@ -73,11 +75,39 @@ def test_a_body_over_the_seam_is_as_right_as_one_in_the_middle(tmp_path, method)
     assert np.sqrt(np.mean((np.roll(flat, 128, axis=1) - truth) ** 2)) > 1.5 * error[1]
 
 
-def test_motion_that_is_searched_crosses_the_seam(tmp_path):
+@pytest.mark.parametrize("method", ["tap", "gather"])
+def test_arrays_go_around_as_files_do(tmp_path, method):
+    """A frame of a Clip, and one of arrays as a renderer writes them: `wrap="on"`."""
+    pattern = _write(tmp_path, 0)
+    expected, _ = _blurred(pattern, method)
+    clip = wgmb.Clip(pattern)
+    blur = wgmb.Blur(method, shutter=180, samples=16)
+    for _ in range(2):  # the second time with what was kept
+        np.testing.assert_array_equal(blur(clip[10]), expected)
+    flat = wgmb.Clip(pattern, passes=Passes(wrap="off"))[10]
+    sides = {side: replace(getattr(flat, side), wrap="on") for side in ("prev", "next")}
+    passes = {name: array for name, array in flat.arrays.items() if name != "color"}
+    more = {"samples": 16, "method": method, **sides, **passes}
+    np.testing.assert_array_equal(wgmb.blur(flat.color, wrap="on", **more), expected)
+    assert _differ(wgmb.blur(flat.color, **more), expected) > 0.1
+
+
+def test_what_is_no_whole_panorama_is_refused():
+    color = np.zeros((8, 16, 3), np.float32)
+    with pytest.raises(wgmb.InputError, match=r"`wrap`.*off"):
+        wgmb.Frame(color, wrap="auto")
+    part = wgmb.Frame(color, np.zeros((8, 16, 2), "f4"), window=(0, 0, 32, 16), wrap="on")
+    with pytest.raises(wgmb.InputError, match="needs the whole panorama"):
+        wgmb.Blur("tap")(part)
+
+
+@pytest.mark.parametrize("shift", [0, -15, 20])
+def test_motion_that_is_searched_crosses_the_seam(tmp_path, shift):
     """The share of the disc whose motion is found to both sides, to a tenth of its speed."""
     right = []
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     for name, centre, wrap in (("middle", 128, "on"), ("seam", 0, "auto"), ("off", 0, "off")):
+        centre = (centre + shift) % WIDTH
         (tmp_path / name).mkdir()
         for number in (9, 10, 11):
             rgb, disc = _picture(number, centre)
@@ -91,7 +121,7 @@ def test_motion_that_is_searched_crosses_the_seam(tmp_path):
         motion = clip.frame(clip.source(10)).motion
         off = np.abs(motion[..., ::2] - (-SPEED, SPEED)).max(axis=2)
         right.append(float((off[_picture(10, centre)[1]] < SPEED / 10).mean()))
-    assert right[1] > 0.7 * right[0] > 0.6 and right[2] < 0.3, right
+    assert right[1] > 0.99 * right[0] > 0.95 and right[2] < 0.7, right
 
 
 @pytest.mark.fast
@@ -113,10 +143,10 @@ def test_a_panorama_is_found_by_its_attribute_its_edges_or_its_vectors(tmp_path)
 def test_a_flat_picture_of_twice_its_height_is_no_panorama():
     rng = np.random.default_rng(0)
     texture = rng.random((64, 160, 3), np.float32)
-    assert not panorama.joins(np.cumsum(texture, axis=1)[:, :128] / 128)
+    assert not panorama_signs.joins(np.cumsum(texture, axis=1)[:, :128] / 128)
     around = np.cumsum(texture[:, :128] - texture[:, :128].mean(axis=1, keepdims=True), axis=1)
-    assert panorama.joins(0.5 + 0.02 * around)
-    assert not panorama.joins(np.full((64, 128, 3), 0.5, np.float32))
+    assert panorama_signs.joins(0.5 + 0.02 * around)
+    assert not panorama_signs.joins(np.full((64, 128, 3), 0.5, np.float32))
 
 
 @pytest.mark.fast

@@ -6,7 +6,7 @@ import pytest
 
 import make_frames as make
 from viewer_hand import PLAIN, SAMPLE, Hand, put, seen
-from wgmb import Blur, Clip, InputError
+from wgmb import Blur, Clip, InputError, Passes
 from wgmb.cli import app
 from wgmb.color.srgb import srgb
 from wgmb.methods import METHODS, default_method
@@ -28,6 +28,30 @@ def test_frames_on_disk_are_blurred_as_the_library_does(reel):
     reel.picture()
     got = reel.viewer.stage.download()[..., :3]
     assert np.abs(got - want[..., :3]).max() < 1e-5
+
+
+@pytest.mark.parametrize("look", ["result", "perceived"])
+def test_a_panorama_goes_around_as_in_a_file(tmp_path, hand, look):
+    x = np.mgrid[:64, :128][1]
+    for number in (1, 2):
+        ball = np.abs((x - 12 * (number - 1) + 64) % 128 - 64) < 8
+        planes = {c: 0.2 + 0.7 * ball.astype("f4") for c in "RGB"}
+        ahead = np.where(ball, (x + 12) % 128 - x, 0).astype("f4")
+        planes |= {"forward.u": ahead, "forward.v": np.zeros((64, 128), "f4")}
+        make.write_exr(tmp_path / f"s.{number:04}.exr", planes)
+    pattern = str(tmp_path / "s.####.exr")
+    hand.viewer.state = put(PLAIN, antialias=1).opened(pattern)
+    hand.viewer.state = put(hand.state, look=look, frame=1.0)
+    hand.picture()
+    got = hand.viewer.stage.download()[..., :3]
+    blur = Blur("tap", samples=4)
+    want, flat = (
+        blur(Clip(pattern, passes=Passes(wrap=wrap))[1])[..., :3] for wrap in ("auto", "off")
+    )
+    if look == "perceived":
+        got, want, flat = srgb(np.clip(got, 0, 1)), seen([want], 24.0), seen([flat], 24.0)
+    assert np.abs(got - want).max() < 4e-3
+    assert np.abs(want - flat).max() > 0.05
 
 
 def test_frames_on_disk_are_perceived_too(reel):

@@ -53,6 +53,17 @@ def _of_kind(rows: np.ndarray, kind: np.dtype) -> np.ndarray:
         return np.ascontiguousarray(rows, kind)
 
 
+def copy_middle(
+    encoder: wgpu.GPUCommandEncoder, wide: wgpu.GPUTexture, output: wgpu.GPUTexture
+) -> None:
+    """Record a copy of the middle columns of a texture, which is as high as `output`, into it."""
+    width, height, _ = output.size
+    left = (wide.size[0] - width) // 2
+    encoder.copy_texture_to_texture(
+        {"texture": wide, "origin": (left, 0, 0)}, {"texture": output}, (width, height, 1)
+    )
+
+
 class ScratchBuffer:
     """A storage buffer that is only remade when it has to grow."""
 

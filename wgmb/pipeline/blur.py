@@ -18,7 +18,7 @@ from ..camera import Window
 from ..errors import InputError
 from ..extent import Extent
 from ..frame import Floats, Frame
-from ..gpu.textures import TexturePool
+from ..gpu.textures import TexturePool, copy_middle
 from ..gpu.timing import Clock
 from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
 from ..gpu_frame.preparation import Preparation
@@ -44,6 +44,7 @@ from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter, Weight
 from .arguments import checked, method_of, most_samples, shutter_of
+from .panorama import PanoramaCanvas, shortest
 
 
 class Blur:
@@ -107,6 +108,7 @@ class Blur:
         self.method = kind(self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
+        self._around = PanoramaCanvas()
         strata = AUTO_STRATA if self.auto else samples
         self._constants = FrameConstants(self.device, samples, strata, jitter, max_blur)
         self._images = TexturePool(self.device)
@@ -287,17 +289,47 @@ class Blur:
         with self._working(frame.size):
             output = self._images.texture("output", frame.size, self.output)
             encoder = self.device.create_command_encoder(label="wgmb")
-            self.encode(encoder, output=output.create_view(), **self._views(frame))
+            self._encode_arrays(encoder, frame, {"output": output})
             picture = self._images.download(encoder, output)
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
 
     def draw(self, frame: Frame, output: View, timing: Clock | None = None) -> None:
-        """Submit the blur of a frame into `output`, without waiting; all as for `encode`."""
+        """Submit the blur of a frame into `output`, without waiting; all as for `encode`.
+
+        The output of a panorama needs the usage COPY_DST, too.
+        """
         self._require(frame.has)
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb")
-            self.encode(encoder, output=output, timing=timing, **self._views(frame))
+            self._encode_arrays(encoder, frame, {"output": view_of(output).texture}, timing)
             gpu.submit(self.device, encoder)
+
+    def _encode_arrays(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        frame: Frame,
+        outputs: dict[str, wgpu.GPUTexture],
+        timing: Clock | None = None,
+    ) -> None:
+        """Record the blur of a frame of arrays into its outputs, as `encode` calls them."""
+        laid = self._laid(frame)
+        wide = {
+            name: texture
+            if laid is frame
+            else self._images.texture(f"wide {name}", laid.size, self.output)
+            for name, texture in outputs.items()
+        }
+        views = {name: texture.create_view() for name, texture in wide.items()}
+        self.encode(encoder, timing=timing, **views, **self._views(laid))
+        if laid is not frame:
+            for name, texture in outputs.items():
+                copy_middle(encoder, wide[name], texture)
+
+    def _laid(self, frame: Frame) -> Frame:
+        """The frame; a panorama with room beyond its edges."""
+        if frame.wrap == "off":
+            return frame
+        return self._around.of(frames_around(frame, self.method), self.extent)
 
     def with_confidence(
         self, frame: Frame
@@ -314,8 +346,7 @@ class Blur:
             output = self._images.texture("output", size, self.output)
             sure = self._images.texture("confidence", size, self.output)
             encoder = self.device.create_command_encoder(label="wgmb")
-            views = {"output": output.create_view(), "confidence": sure.create_view()}
-            self.encode(encoder, **views, **self._views(frame))
+            self._encode_arrays(encoder, frame, {"output": output, "confidence": sure})
             picture = self._images.download(encoder, output)[..., :channels]
             told = self._images.download(self.device.create_command_encoder(), sure)
         planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
@@ -328,6 +359,7 @@ class Blur:
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb motion")
             motion = self._images.texture("motion", frame.size, "rgba32float")
+            frame = shortest(frame) if frame.wrap == "on" else frame
             views = self._residency.views_of({0: frame})[0]
             self.encode_motion(encoder, views, motion.create_view(), frame.number)
             return self._images.download(encoder, motion)
@@ -346,7 +378,7 @@ class Blur:
     def upload(self, frame: Frame) -> dict[str, Any]:
         """Upload a frame and its neighbours; returns the keywords of `encode`.
 
-        The textures are reused by the next frame.
+        The textures are reused by the next frame. Those of a panorama are flat, as all textures.
         """
         with self._working(frame.size):
             return uploaded(frame, self.method, self._residency)

@@ -37,6 +37,7 @@ class FrameKeywords(MethodKeywords, total=False):
     prev: Frame | None
     next: Frame | None
     number: int
+    wrap: Literal["off", "on"]
     diffuse_light: Floats | None
     diffuse_color: Floats | None
     glossy_light: Floats | None

@@ -19,7 +19,7 @@ from ..frame import Frame
 from ..gpu.textures import TexturePool
 from ..output.result import Result
 from ..pipeline.blur import Blur
-from ..sequence import panorama
+from ..sequence import panorama_signs
 from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement
 from ..sequence.frame_builder import ALONE
@@ -265,5 +265,5 @@ class PictureStages(Stages):
 def are_pictures(clip: Clip) -> bool:
     """True if frames are whole pictures, which PictureStages takes; neither parts nor panoramas."""
     source = clip.source(clip.numbers[0])
-    wraps = clip.passes.wrap == "on" or panorama.has_shape(source) or panorama.is_stated(source)
+    wraps = clip.passes.wrap == "on" or panorama_signs.may_be(source)
     return source.data_window == source.display_window and not wraps

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
+from ..pipeline import panorama
 from ..shots.cuts import pictures_differ
 from ..shots.motion import Found, MotionSource, ShotMotion
-from . import panorama
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
@@ -26,7 +26,8 @@ class PictureMotion:
     """Motion (height, width, 4) [px] and depth order of frames by a source of motion.
 
     A frame's motion depends on pictures of its own shot alone, and of its own data window. Motion
-    of a picture that `goes_around` is found across its left and right edge, too.
+    of a picture that `goes_around` is found across its left and right edge, too: the search sees
+    it a second time, turned by half, where this edge is in the middle.
     """
 
     def __init__(
@@ -34,32 +35,34 @@ class PictureMotion:
     ):
         self._stored, self._motion, self._goes_around = stored, motion, goes_around
         self._cuts: dict[tuple[int, str | None], bool] = {}
-        self._views: dict[str | None, ShotMotion] = {}
+        self._searches: dict[tuple[str | None, bool], ShotMotion] = {}
 
     def __call__(self, source: FrameFile) -> Found | None:
         """None where a frame is alone in its shot."""
         number, view = source.number, source.view
         height, width = source.rgba.shape[:2]
         self._stored.margin = max(self._stored.margin, self._motion.reach((width, height)))
-        if view not in self._views:
-            self._views[view] = ShotMotion(
-                self._motion,
-                lambda number: self._picture(number, view),
-                lambda a, b: self._same_shot(a, b, view),
-            )
-        found = self._views[view](number)
+        found = self._search(view, is_turned=False)(number)
         if found is None or not self._goes_around(source):
             return found
-        room = panorama.room(width)
-        motion, depth = (None if a is None else a[:, room : room + width] for a in found)
-        assert motion is not None
-        return np.ascontiguousarray(motion), None if depth is None else np.ascontiguousarray(depth)
+        turned = self._search(view, is_turned=True)(number)
+        return found if turned is None else _around(found, turned)
 
-    def _picture(self, number: int, view: str | None) -> np.ndarray | None:
+    def _search(self, view: str | None, is_turned: bool) -> ShotMotion:
+        """The search in the pictures of a view, or in the same, turned by half."""
+        if (key := (view, is_turned)) not in self._searches:
+            self._searches[key] = ShotMotion(
+                self._motion,
+                lambda number: self._picture(number, *key),
+                lambda a, b: self._same_shot(a, b, view),
+            )
+        return self._searches[key]
+
+    def _picture(self, number: int, view: str | None, is_turned: bool) -> np.ndarray | None:
         source = self._source(number, view)
         if source is None:
             return None
-        return panorama.widened(source.rgba) if self._goes_around(source) else source.rgba
+        return panorama.turned(source.rgba) if is_turned else source.rgba
 
     def _same_shot(self, a: int, b: int, view: str | None) -> bool:
         """True if no cut lies between two frames; frames far apart count as different shots."""
@@ -91,3 +94,11 @@ class PictureMotion:
             return found if found.reference_channel is not None else None
         except (InputError, OSError):  # its turn to fail comes
             return None
+
+
+def _around(found: Found, turned: Found) -> Found:
+    """Motion and depth of a panorama, and of the same one turned by half, each from its middle."""
+    (motion, depth), (other, its_depth) = found, turned
+    if depth is not None and its_depth is not None:
+        depth = panorama.joined(depth, its_depth)
+    return panorama.joined(motion, other), depth

@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 from ..errors import InputError, check_choice
 from ..extent import Extent
 from ..frame import Frame
+from ..pipeline import panorama
 from ..shots.cuts import (
     frames_differ,
     is_cut,
@@ -18,7 +20,7 @@ from ..shots.cuts import (
     still,
     straightened,
 )
-from . import panorama
+from . import panorama_signs
 from .clip_frame import ClipFrame
 from .data_windows import (
     OUTSIDE,
@@ -50,7 +52,7 @@ class Neighbours:
 
     def __init__(self, stored: FrameCache, builder: FrameBuilder, is_search: bool):
         check_choice("outside", stored.passes.outside, OUTSIDE)
-        check_choice("`wrap`", stored.passes.wrap, panorama.WRAPS)
+        check_choice("`wrap`", stored.passes.wrap, panorama_signs.WRAPS)
         self._stored, self._builder, self._is_search = stored, builder, is_search
         self._outside = stored.passes.outside
         self.cuts: set[int] = set()
@@ -63,7 +65,6 @@ class Neighbours:
         self.beyond_note = ""  # a line for the user about `beyond`; "" without such sides
         self._jumps: dict[int, list[int]] = {}
         self._cuts_to: dict[tuple[int, int], bool] = {}
-        self._panoramas: set[tuple[int, str | None]] = set()
 
     def forget(self, number: int) -> None:
         """Drop all data made of a frame."""
@@ -86,8 +87,7 @@ class Neighbours:
         """The Frame of `source` in its own window, without motion that leads across a cut."""
         frame = self._builder.build(source, wanted)
         if self._is_panorama(source, frame):
-            self._panoramas.add((source.number, source.view))
-            frame = panorama.shortest(frame)
+            frame = replace(panorama.shortest(frame), wrap="on")
         if all(self._stored.is_known_cut(source.number, side) for side in (-1, 1)):
             self.cuts |= {source.number, source.number + 1}
             return still(frame)
@@ -102,8 +102,8 @@ class Neighbours:
         """The frame by itself, on a canvas with room for `extent`."""
         frame = self.frame(source, wanted)
         frames = {0: (source, frame)}
-        onto, wraps = self._canvas(frames, extent), self._wraps(frames)
-        return self._laid(onto, source, frame, wraps), Placement(onto, self._bounds(source))
+        onto = self._canvas(frames, extent)
+        return self._laid(onto, source, frame), Placement(onto, self._bounds(source))
 
     def between(
         self, source: FrameFile, wanted: frozenset[str], extent: Extent | None, reach: int
@@ -121,8 +121,8 @@ class Neighbours:
                 if found is None:
                     break
                 frames[offset] = found
-        onto, wraps = self._canvas(frames, extent), self._wraps(frames)
-        made = {side: self._on(onto, *one, wraps) for side, one in frames.items()}
+        onto = self._canvas(frames, extent)
+        made = {side: self._on(onto, *one) for side, one in frames.items()}
         beside: list[Frame | None] = []
         for side in (-1, 1):
             near, beyond = made.get(side), made.get(2 * side)
@@ -173,7 +173,7 @@ class Neighbours:
             self._alone[key] = source, wanted, frame
         return frame
 
-    def _on(self, onto: Window, source: FrameFile, frame: Frame, wraps: bool = False) -> Frame:
+    def _on(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
         """`frame` on a canvas, made once while the canvas stays the same."""
         if source.data_window == onto:
             return frame
@@ -182,14 +182,12 @@ class Neighbours:
         if result is None or made is not frame or then != onto:
             self._placed.pop(key, None)
             self._make_room(self._placed)
-            result = self._laid(onto, source, frame, wraps).locked()
+            result = self._laid(onto, source, frame).locked()
             self._placed[key] = frame, onto, result
         return result
 
-    def _laid(self, onto: Window, source: FrameFile, frame: Frame, wraps: bool) -> Frame:
-        """`frame` on a canvas; `wraps`: pixels beyond its sides are read around them."""
-        if wraps:
-            return panorama.placed(frame, source.data_window, onto)
+    def _laid(self, onto: Window, source: FrameFile, frame: Frame) -> Frame:
+        """`frame` on a canvas."""
         return placed(frame, source.data_window, onto, self._edges(source, onto))
 
     def _make_room(self, kept: OrderedDict[tuple[int, str | None], Any]) -> None:
@@ -257,11 +255,6 @@ class Neighbours:
         source, _ = frames[0]
         display, windows = source.display_window, [file.data_window for file, _ in frames.values()]
         held = union(windows)
-        if self._wraps(frames):
-            if extent is None or extent.spread == "everywhere":
-                return display
-            boxes = [extent.box(frame, offset) for offset, (_, frame) in frames.items()]
-            return panorama.canvas(display, [box for box in boxes if box is not None])
         if extent is None or held == display == source.data_window:
             return held
         limit = allowed(windows, display, self._cut_through)
@@ -312,7 +305,7 @@ class Neighbours:
         if wrap == "on":
             return True
         reason = self._what_joins(source)
-        if not reason and panorama.has_shape(source) and panorama.crosses(frame.motion):
+        if not reason and panorama_signs.has_shape(source) and panorama.crosses(frame.motion):
             reason = "2:1, and vectors are longer than half its width"
         if not reason:
             return False
@@ -328,17 +321,11 @@ class Neighbours:
 
     def _what_joins(self, source: FrameFile) -> str:
         """The reason to join the edges of a picture, apart from its motion; '' for none."""
-        if panorama.is_stated(source):
+        if panorama_signs.is_stated(source):
             return "its attribute envmap says so"
-        if panorama.has_shape(source) and self.is_joined:
+        if panorama_signs.has_shape(source) and self.is_joined:
             return "2:1, and its left edge goes on where the right one ends"
         return ""
-
-    def _wraps(self, frames: Mapping[int, tuple[FrameFile, Frame]]) -> bool:
-        """True if the frames, by their offset, are to be read around their edges."""
-        source, _ = frames[0]
-        is_whole = all(file.data_window == source.display_window for file, _ in frames.values())
-        return is_whole and (source.number, source.view) in self._panoramas
 
     @cached_property
     def is_joined(self) -> bool:
@@ -348,9 +335,13 @@ class Neighbours:
         """
         leaders = self._some_leaders()
         first = next(leaders, None)
-        if first is None or not (panorama.has_shape(first) and panorama.joins(first.rgba)):
+        if first is None or not (
+            panorama_signs.has_shape(first) and panorama_signs.joins(first.rgba)
+        ):
             return False
-        return all(panorama.joins(one.rgba) for one in leaders if panorama.has_shape(one))
+        return all(
+            panorama_signs.joins(one.rgba) for one in leaders if panorama_signs.has_shape(one)
+        )
 
     def _some_leaders(self) -> Iterator[FrameFile]:
         """The first, the middle and the last frame on disk, as far as their pictures are readable.

@@ -121,7 +121,11 @@ class Perceived:
         self._frames = {}
 
     def _texture(self, blur: Blur, width: int, height: int) -> wgpu.GPUTexture:
-        usage = wgpu.TextureUsage.STORAGE_BINDING | wgpu.TextureUsage.TEXTURE_BINDING
+        usage = (
+            wgpu.TextureUsage.STORAGE_BINDING
+            | wgpu.TextureUsage.TEXTURE_BINDING
+            | wgpu.TextureUsage.COPY_DST
+        )
         return self._device.create_texture(
             label="held", size=(width, height, 1), format=blur.output, usage=usage
         )

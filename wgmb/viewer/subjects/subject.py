@@ -14,12 +14,13 @@ from ... import gpu
 from ...color.spaces import ColorConfig, ColorSpace, Display
 from ...extent import EVERYWHERE
 from ...frame import Frame
-from ...gpu.textures import TexturePool
+from ...gpu.textures import TexturePool, copy_middle
 from ...gpu.timing import Clock
 from ...gpu_frame.residency import Residency
 from ...methods import METHODS
-from ...methods.contract import reach_of
+from ...methods.contract import frames_around, reach_of
 from ...pipeline.blur import Blur, uploaded
+from ...pipeline.panorama import PanoramaCanvas
 from ...render import Render
 from ...scene import builtin
 from ...scene.scene import Scene
@@ -118,7 +119,7 @@ class _Uploads:
     """A set of textures, and their contents."""
 
     residency: Residency
-    which: _Which | None = None
+    which: tuple[_Which, tuple[int, int]] | None = None
     inputs: dict[str, Any] = field(default_factory=dict)
 
 
@@ -135,7 +136,7 @@ class ClipSubject:
         self._headers: dict[tuple, FrameFile] = {}  # what the frames say of their colours
         self._layers: dict[tuple, dict[str, str]] = {}
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
-        self._sharp = Blur("tap", device=device)
+        self._sharp, self._around = Blur("tap", device=device), PanoramaCanvas()
         self._uploads: OrderedDict[tuple, _Uploads] = OrderedDict()
         self._now = self._which(state)
 
@@ -246,8 +247,11 @@ class ClipSubject:
         self._frames.move_to_end(key)
         return self._frames[key]
 
-    def _inputs(self, blur: Blur) -> dict:
-        """The frame's textures, one set for all methods that take the same."""
+    def _inputs(self, blur: Blur, is_whole: bool = True) -> dict:
+        """The frame's textures, one set for all methods that take the same.
+
+        `is_whole`: a panorama has room beyond its edges for the blur.
+        """
         method, frame = blur.method, self._frame(self._now)
         key = method.needs | method.uses, reach_of(method)
         while len(self._uploads) >= _SETS_KEPT and key not in self._uploads:
@@ -257,17 +261,20 @@ class ClipSubject:
             self._uploads[key] = _Uploads(Residency(images, key[0], 2 * key[1] + 1))
         self._uploads.move_to_end(key)
         kept = self._uploads[key]
-        if kept.which != self._now:
+        if is_whole and frame.wrap == "on":
+            frame = self._around.of(frames_around(frame, method), blur.extent)
+        which = self._now, frame.size
+        if kept.which != which:
             kept.which = None
             with gpu.reported(frame.size):
                 kept.inputs = uploaded(frame, method, kept.residency)
-            kept.which = self._now
+            kept.which = which
         return dict(kept.inputs)
 
     def passes(self) -> dict[str, Texture]:
         """The sharp picture and its layers, by name; only those that exist."""
         frame, images = self._frame(self._now), self._images
-        inputs = self._inputs(self._sharp)
+        inputs = self._inputs(self._sharp, is_whole=False)
         color, depth, motion_ = (f"{name} {self._now[1]}" for name in ("color", "depth", "motion"))
         images.upload(color, _opaque(frame.color), "rgba32float")
         found = {"color": images.texture(color, frame.size, "rgba32float")}
@@ -285,8 +292,13 @@ class ClipSubject:
     def draw(self, blur: Blur, output: Texture, budget: Budget, timing: Clock | None) -> int:
         """Draw with `blur`, all its samples."""
         encoder = self._device.create_command_encoder(label="blur")
-        view = output.create_view()
-        blur.encode(encoder, output=view, timing=timing, **self._inputs(blur))
+        inputs = self._inputs(blur)
+        size, wide = inputs["frame"].size, output
+        if size != tuple(output.size[:2]):
+            wide = self._images.texture("wide", size, blur.output)
+        blur.encode(encoder, output=wide.create_view(), timing=timing, **inputs)
+        if wide is not output:
+            copy_middle(encoder, wide, output)
         gpu.submit(self._device, encoder)
         return blur.samples
 
