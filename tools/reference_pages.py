@@ -17,6 +17,7 @@ from wgmb.cli.app import COMMANDS, make_app
 from wgmb.cli.help import GROUPS, MAIN, about, place
 from wgmb.scene import builtin
 from wgmb.sequence.layers.vectors import CONVENTIONS
+from wgmb.settings.programs import PROGRAMS
 
 DOCS = Path(__file__).parents[1] / "docs"
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}
@@ -44,6 +45,15 @@ def convention_table() -> str:
     """Values of `--vectors`, as Markdown."""
     rows = ["| `--vectors` | meaning of the numbers |", "|---|---|"]
     rows += [f"| `{name}` | {_plain(c.about)} |" for name, c in CONVENTIONS.items()]
+    return "\n".join(rows) + "\n"
+
+
+def program_table() -> str:
+    """Values of `--program`, as Markdown."""
+    rows = ["| `--program` | frames of | it sets |", "|---|---|---|"]
+    for name, program in PROGRAMS.items():
+        words = (f"`--{k.replace('_', '-')} {v}`" for k, v in program.options.items())
+        rows.append(f"| `{name}` | {program.name} | {', '.join(words)} |")
     return "\n".join(rows) + "\n"
 
 
@@ -124,6 +134,7 @@ def _plain(text: str) -> str:
 PAGES = {
     "reference/cli.md": ("commands", reference),
     "python/scenes.md": ("scenes", scene_table),
+    "artists/other-programs.md": ("programs", program_table),
     "artists/vectors-look-wrong.md": ("conventions", convention_table),
 }
 """The mark of each page, and the function that makes what follows it."""

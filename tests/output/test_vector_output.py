@@ -16,7 +16,7 @@ from wgmb import (
     Vectors,
     vectors_sequence,
 )
-from wgmb.output.vectors import PROGRAMS, written
+from wgmb.output.vectors import FORMS, written
 from wgmb.sequence.layers import vectors
 
 BOTH = ("nuke", "blender", "plain")
@@ -83,7 +83,7 @@ def shot(tmp_path_factory):
     return make.write_sequence(tmp_path_factory.mktemp("shot"), (1, 2, 3), "nuke")
 
 
-@pytest.mark.parametrize("program", [p for p in PROGRAMS if p != "flo"])
+@pytest.mark.parametrize("program", [p for p in FORMS if p != "flo"])
 def test_a_sequence_is_written_as_floats_that_read_back_as_the_same_motion(
     shot, tmp_path, capsys, program
 ):

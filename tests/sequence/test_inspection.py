@@ -82,7 +82,7 @@ def test_a_run_opens_its_first_file_by_inspecting_the_clip(tmp_path, opened, kin
 
 def test_vectors_are_written_of_a_clip_that_was_inspected_first(tmp_path, opened):
     pattern, output = written(tmp_path, "vectors"), str(tmp_path / "v.####.exr")
-    VectorsRequest(pattern=pattern, output=output, program="nuke", input=InputSettings()).open()
+    VectorsRequest(pattern=pattern, output=output, form="nuke", input=InputSettings()).open()
     assert opened[0][opened[0].index("open") + 1] == "inspect"
 
 

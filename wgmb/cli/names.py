@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import InputError
@@ -12,18 +13,50 @@ from ..io import stills
 from ..io.frame_numbers import is_pattern
 from ..io.suffixes import KNOWN_VIDEOS, VIDEOS
 from ..output.names import refuse_inputs
+from ..sequence.folder import frames_in
 from ..sequence.frame_file import is_video
+from ..settings import InputSettings
 
 NAME = "{name}"
 """In an output: the name of the input without folder and suffix."""
 _ELSE = ".mkv"  # what holds every stream, for inputs whose own container is not written
 
 
+@dataclass(frozen=True)
+class FramesNamed:
+    """Frames on the command line: their pattern, the settings of the input, and what to say."""
+
+    pattern: str
+    input: InputSettings
+    text: str = ""
+
+
+def frames_at(pattern: str, input: InputSettings, output: str = "") -> FramesNamed:
+    """The frames that a pattern, a file or a folder stands for; `output`: no input in a folder.
+
+    Of a folder, files that `input` adds are the only ones beside the picture.
+    """
+    if not Path(pattern).is_dir():
+        return FramesNamed(pattern, input)
+    found = frames_in(pattern, input.also, leave_out=output)
+    return FramesNamed(found.pattern, replace(input, also=found.also), found.text)
+
+
+def holds_videos(folder: str) -> bool:
+    """True if there are videos in a folder, by their names."""
+    return any(p.suffix.lower() in KNOWN_VIDEOS for p in Path(folder).iterdir())
+
+
+def is_frames_output(output: str) -> bool:
+    """True if an output is named as frames are."""
+    return Path(output).suffix.lower() in (".exr", *stills.SUFFIXES)
+
+
 def is_batch(patterns: Sequence[str], output: str) -> bool:
     """Return True if the inputs may be several videos, or the output is named after a video."""
     if len(patterns) > 1 or any(Path(p).is_dir() or _has_wildcard(p) for p in patterns):
         return True
-    return (NAME in output or _is_folder(output)) and is_video(patterns[0])
+    return (NAME in output or is_folder(output)) and is_video(patterns[0])
 
 
 def videos_of(patterns: Sequence[str]) -> list[Path]:
@@ -65,7 +98,7 @@ def outputs_of(videos: Sequence[Path], output: str) -> list[str]:
 
     InputError where two would be one, or one is an input.
     """
-    if not _is_folder(output) and NAME not in output and len(videos) > 1:
+    if not is_folder(output) and NAME not in output and len(videos) > 1:
         raise InputError(
             f"output {output}: {len(videos)} videos need a folder that is there or ends in "
             f"{os.sep}, or {NAME} in the name, which stands for the input's"
@@ -86,13 +119,14 @@ def outputs_of(videos: Sequence[Path], output: str) -> list[str]:
 def _output_of(video: Path, output: str) -> str:
     if NAME in output:
         return output.replace(NAME, video.stem)
-    if not _is_folder(output):
+    if not is_folder(output):
         return output
     suffix = video.suffix if video.suffix.lower() in VIDEOS else _ELSE
     return str(Path(output) / f"{video.stem}{suffix}")
 
 
-def _is_folder(output: str) -> bool:
+def is_folder(output: str) -> bool:
+    """True if an output is a folder: it is there, or ends as one."""
     return output.endswith(("/", os.sep)) or Path(output).is_dir()
 
 

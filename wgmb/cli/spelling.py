@@ -17,7 +17,7 @@ _OTHERWISE = {
     "color_in": "--color-in",
     "fps_in": "--fps-in",
     "passes": "--passes",
-    "program": "--as",
+    "form": "--as",
     "sharp": "--sharp",
     "max_displace": "--max-displace",
     "space": "--from",

@@ -166,6 +166,22 @@ def patterns_in(folder: str | Path) -> list[str]:
     return sorted({_COUNTED.sub(lambda m: "#" * len(m[0]), name) for name in names})
 
 
+def sequences_in(folder: str | Path) -> list[Path]:
+    """The patterns of the sequences in a folder: one for names that differ in their number alone,
+    with as many digits as its shortest number has.
+    """
+    shortest: dict[str, str] = {}
+    for name in patterns_in(folder):
+        alike = re.sub("#+", "#", name)
+        shortest[alike] = min(shortest.get(alike, name), name, key=len)
+    return [Path(folder) / name for name in sorted(shortest.values())]
+
+
+def title(path: str | Path) -> str:
+    """The name of a file or pattern without number, view and ending."""
+    return _title(path)
+
+
 def _near(pattern: str | Path) -> str:
     """The end of a message on frames that are not there: a sequence that may be meant, or ''."""
     folder, name = os.path.split(str(pattern))

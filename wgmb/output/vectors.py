@@ -16,7 +16,7 @@ from ..sequence.frame_file import FrameFile
 from .output import Output
 from .result import Result
 
-PROGRAMS = ("nuke", "rsmb", "blender", "plain", "flo")
+FORMS = ("nuke", "rsmb", "blender", "plain", "flo")
 """Whose vectors can be written; CONVENTIONS in vectors.py has the meaning of the numbers."""
 MAX_DISPLACE = 2048.0
 """The motion [px] that rsmb's 0 and 1 stand for, unless another is given."""
@@ -25,23 +25,23 @@ _OF_THE_PICTURE = ("multiView", "view", "chromaticities", record.KEY)
 
 
 def written(
-    motion: np.ndarray, program: str, max_displace: float = MAX_DISPLACE
+    motion: np.ndarray, form: str, max_displace: float = MAX_DISPLACE
 ) -> dict[str, np.ndarray]:
     """The channels in which a program stores `motion`, (height, width, 4) to_prev, to_next [px].
 
     Float32. Motion longer than `max_displace` on an axis is clipped in rsmb's.
     """
     px, py, nx, ny = np.moveaxis(motion.astype(np.float32, copy=False), 2, 0)
-    if program == "nuke":
+    if form == "nuke":
         return {"forward.u": nx, "forward.v": -ny, "backward.u": px, "backward.v": -py}
-    if program == "blender":
+    if form == "blender":
         lead = "ViewLayer.Vector."
         return {f"{lead}X": px, f"{lead}Y": -py, f"{lead}Z": -nx, f"{lead}W": ny}
-    if program == "rsmb":
+    if form == "rsmb":
         half = np.float32(0.5 / max_displace)
         red, green = (np.clip(0.5 + v * half, 0, 1) for v in (nx, -ny))
         return {"R": red, "G": green, "B": np.zeros_like(red)}
-    if program == "flo":
+    if form == "flo":
         return {"u": nx, "v": ny}
     return {"to_prev.x": px, "to_prev.y": py, "to_next.x": nx, "to_next.y": ny}
 
@@ -49,7 +49,7 @@ def written(
 class VectorOutput(Output):
     """Files of motion vectors in a program's form; `written` makes the numbers.
 
-    `program`: one of PROGRAMS. EXR files are 32-bit floats and have the windows of the input;
+    `form`: one of FORMS. EXR files are 32-bit floats and have the windows of the input;
     rsmb's may be PNG or TIFF of 16 bits too, which cover the display window, and have
     `max_displace` in their records. A .flo covers it too, and has no record: it cannot be resumed.
     Alpha of rsmb's is 1 where the vectors are valid. `max_displace`: of rsmb's [px]. `mask_of`: the
@@ -62,7 +62,7 @@ class VectorOutput(Output):
     def __init__(
         self,
         pattern: str | Path,
-        program: str,
+        form: str,
         *,
         numbers: list[int],
         max_displace: float | None = None,
@@ -73,14 +73,14 @@ class VectorOutput(Output):
         resume: bool = False,
         views: Sequence[str] = (),
     ):
-        _check(str(pattern), program, max_displace, resume)
-        self._program, self._mask_of = program, mask_of
-        self._has_record = program != "flo"
+        _check(str(pattern), form, max_displace, resume)
+        self._form, self._mask_of = form, mask_of
+        self._has_record = form != "flo"
         self._max_displace = MAX_DISPLACE if max_displace is None else max_displace
-        unit = {"max_displace": self._max_displace} if program == "rsmb" else {}
+        unit = {"max_displace": self._max_displace} if form == "rsmb" else {}
         super().__init__(
             pattern,
-            settings=(settings or {}) | {"as": program} | unit,
+            settings=(settings or {}) | {"as": form} | unit,
             numbers=numbers,
             bits=16 if str(pattern).lower().endswith(_DEEP) else 8,
             inputs=inputs,
@@ -98,13 +98,13 @@ class VectorOutput(Output):
     def _encoded(self, path: Path, view: str | None, results: Sequence[Result], text: str) -> bytes:
         (result,) = results
         source, motion = result.source, result.picture
-        channels = written(motion, self._program, self._max_displace)
-        if self._program == "rsmb":
+        channels = written(motion, self._form, self._max_displace)
+        if self._form == "rsmb":
             channels["A"] = self._valid(source, motion)
             over = np.abs(motion[..., 2:]).max(axis=2) > self._max_displace
             if count := int(over.sum()):
                 self.clipped[source.number] = self.clipped.get(source.number, 0) + count
-        if self._program == "flo":
+        if self._form == "flo":
             shown = source.data_window, source.display_window
             return data_files.encode_flo(
                 np.stack([laid(channels[c], *shown) for c in "uv"], axis=2)
@@ -121,15 +121,15 @@ class VectorOutput(Output):
         return valid
 
 
-def _check(pattern: str, program: str, max_displace: float | None, resume: bool) -> None:
-    check_choice("`program`", program, PROGRAMS)
-    ends = {"rsmb": (".exr", *_DEEP), "flo": (data_files.FLO,)}.get(program, (".exr",))
+def _check(pattern: str, form: str, max_displace: float | None, resume: bool) -> None:
+    check_choice("`form`", form, FORMS)
+    ends = {"rsmb": (".exr", *_DEEP), "flo": (data_files.FLO,)}.get(form, (".exr",))
     if not pattern.lower().endswith(ends):
-        raise InputError(f"output {pattern}: {program} vectors need {' or '.join(ends)}")
-    if resume and program == "flo":
+        raise InputError(f"output {pattern}: {form} vectors need {' or '.join(ends)}")
+    if resume and form == "flo":
         raise InputError("`resume` needs the record of a file, which a .flo cannot hold")
-    if max_displace is not None and program != "rsmb":
-        raise InputError(f"`max_displace` is for rsmb vectors, {program} vectors are in pixels")
+    if max_displace is not None and form != "rsmb":
+        raise InputError(f"`max_displace` is for rsmb vectors, {form} vectors are in pixels")
     if max_displace is not None and not 0 < max_displace < 1e6:
         raise InputError(
             f"`max_displace` must be over 0 and under 1000000 px, got {max_displace:g}"

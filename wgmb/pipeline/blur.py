@@ -108,7 +108,7 @@ class Blur:
         self.method = kind(self.device, self._options, output=output)
         self.samples, self.jitter, self.max_blur, self.output = samples, jitter, max_blur, output
         self._lock = threading.RLock()
-        self._around = PanoramaCanvas()
+        self._panorama = PanoramaCanvas()
         strata = AUTO_STRATA if self.auto else samples
         self._constants = FrameConstants(self.device, samples, strata, jitter, max_blur)
         self._images = TexturePool(self.device)
@@ -329,7 +329,7 @@ class Blur:
         """The frame; a panorama with room beyond its edges."""
         if frame.wrap == "off":
             return frame
-        return self._around.of(frames_around(frame, self.method), self.extent)
+        return self._panorama.of(frames_around(frame, self.method), self.extent)
 
     def with_confidence(
         self, frame: Frame

@@ -48,8 +48,8 @@ def turned(picture: np.ndarray) -> np.ndarray:
 
 
 def joined(image: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """An image of a panorama, (height, width, ...), joined of it and of one of `turned`: each has its
-    middle right."""
+    """An image of a panorama, (height, width, ...): the middle of `image`, and the rest from the
+    middle of `other`, that of `turned`."""
     width = image.shape[1]
     whole = np.roll(other, -(width // 2), axis=1)
     whole[:, width // 4 : width - width // 4] = image[:, width // 4 : width - width // 4]
@@ -63,13 +63,13 @@ class PanoramaCanvas:
     """
 
     def __init__(self) -> None:
-        self._made: OrderedDict[int, tuple[Frame, int, Frame]] = OrderedDict()
+        self._laid: OrderedDict[int, tuple[Frame, int, Frame]] = OrderedDict()
 
     def of(self, frames: Mapping[int, Frame], extent: Extent) -> Frame:
         """The frame at 0 with those around it, by their offsets, and room for a blur's `extent`."""
         room = _room(frames, extent)
-        while len(self._made) > 2 * len(frames):
-            self._made.popitem(last=False)
+        while len(self._laid) > 2 * len(frames):
+            self._laid.popitem(last=False)
         made = {offset: self._placed(frame, room) for offset, frame in frames.items()}
         for far in (-2, 2):
             if far in made:
@@ -79,14 +79,14 @@ class PanoramaCanvas:
 
     def _placed(self, frame: Frame, room: int) -> Frame:
         key = id(frame.color)
-        known, its_room, made = self._made.get(key, (None, 0, None))
+        known, its_room, made = self._laid.get(key, (None, 0, None))
         same = (
             known is not None and known.is_locked and known.arrays.items() == frame.arrays.items()
         )
         if made is None or not same or its_room != room:
             made = placed(shortest(frame.between(None, None)), room).locked()
-            self._made[key] = frame, room, made
-        self._made.move_to_end(key)
+            self._laid[key] = frame, room, made
+        self._laid.move_to_end(key)
         return made
 
 

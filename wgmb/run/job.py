@@ -230,6 +230,7 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     request = replace(request, shutter=request.shutter.resolved(fps=_rate(request, clip)))
     clip.builder.check_layers()
     remarks = [
+        request.input.remark,
         request.shutter.remark,
         *map(_of_scale, request.blur.scale),
         _of_cuts(request.input.cuts, clip),

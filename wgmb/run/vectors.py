@@ -18,11 +18,11 @@ from .sequence import vectors_sequence
 
 @dataclass(frozen=True, kw_only=True)
 class VectorsRequest:
-    """Request to write vectors, as `wgmb vectors` receives it; `program`: one of PROGRAMS."""
+    """Request to write vectors, as `wgmb vectors` receives it; `form`: one of FORMS."""
 
     pattern: str
     output: str
-    program: str
+    form: str
     input: InputSettings
     max_displace: float | None = None
     overwrite: bool = False
@@ -32,13 +32,13 @@ class VectorsRequest:
         """Open frames, GPU and output; InputError for frames without motion."""
         clip = self.input.open(self.pattern)
         has = clip.inspect().has
-        settings = record(self.input, **{"as": self.program}, max_displace=self.max_displace)
+        settings = record(self.input, **{"as": self.form}, max_displace=self.max_displace)
         if has and "motion" not in has:
             raise InputError(f"{self.pattern}: no motion to write (neither vectors nor a camera)")
         blur = Blur("tap", device=device)
         files = VectorOutput(
             self.output,
-            self.program,
+            self.form,
             numbers=clip.numbers,
             max_displace=self.max_displace,
             mask_of=clip.vector_mask,

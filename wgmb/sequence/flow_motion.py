@@ -46,7 +46,7 @@ class PictureMotion:
         if found is None or not self._goes_around(source):
             return found
         turned = self._search(view, is_turned=True)(number)
-        return found if turned is None else _around(found, turned)
+        return found if turned is None else _joined(found, turned)
 
     def _search(self, view: str | None, is_turned: bool) -> ShotMotion:
         """The search in the pictures of a view, or in the same, turned by half."""
@@ -96,9 +96,9 @@ class PictureMotion:
             return None
 
 
-def _around(found: Found, turned: Found) -> Found:
+def _joined(flat: Found, turned: Found) -> Found:
     """Motion and depth of a panorama, and of the same one turned by half, each from its middle."""
-    (motion, depth), (other, its_depth) = found, turned
+    (motion, depth), (other, its_depth) = flat, turned
     if depth is not None and its_depth is not None:
         depth = panorama.joined(depth, its_depth)
     return panorama.joined(motion, other), depth

@@ -1,18 +1,20 @@
 """Settings of the input frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from ..color.spaces import ColorSpace
+from ..errors import check_choice
 from ..io import limits
 from ..io.frame_numbers import is_pattern, readable
 from ..sequence.clip import Clip, Passes
 from ..sequence.findings import SequenceFindings
 from ..sequence.layers import vectors
+from .programs import PROGRAMS, ProgramName
 from .record import plain
 
-_NO_LOOK = "frames", "skip_missing", "max_mb"
+_NO_LOOK = "program", "frames", "skip_missing", "max_mb"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +23,8 @@ class InputSettings:
 
     frames: str | None = None
     "Frame numbers, such as 1-100x2 or 1,3,5-8; by default all existing frames."
+    program: ProgramName | None = None
+    "Program that made the frames: sets the options that they need, where they are not given."
     layer: str | None = None
     "Colour layer, if it cannot be found by name."
     vectors: str = "auto"
@@ -71,7 +75,30 @@ class InputSettings:
     @property
     def looks(self) -> dict[str, Any]:
         """The settings that change frames; the others select or limit them."""
-        return {k: v for k, v in plain(self).items() if k not in _NO_LOOK}
+        return {k: v for k, v in plain(self.of_program).items() if k not in _NO_LOOK}
+
+    @property
+    def of_program(self) -> Self:
+        """A copy with the options that its program sets, as far as they were left as they are."""
+        if self.program is None:
+            return self
+        check_choice("`program`", self.program, PROGRAMS)
+        return replace(self, program=None, **self._set_by_program)
+
+    @property
+    def _set_by_program(self) -> dict[str, Any]:
+        unset = {one.name for one in fields(self) if getattr(self, one.name) == one.default}
+        program = PROGRAMS[self.program] if self.program else None
+        return {k: v for k, v in program.options.items() if k in unset} if program else {}
+
+    @property
+    def remark(self) -> str:
+        """The options that the program sets, in one line; "" without one."""
+        if self.program is None:
+            return ""
+        told = [f"`{name}={value}`" for name, value in self._set_by_program.items()]
+        name = PROGRAMS[self.program].name
+        return f"frames of {name}: {', '.join(told) or 'every option of it is given otherwise'}"
 
     def open(
         self,
@@ -86,6 +113,8 @@ class InputSettings:
         `settled`: what was found out about the sequence before (Clip.settle). InputError if a file
         is not readable, or a mask names what no Cryptomatte has.
         """
+        if self.program is not None:
+            return self.of_program.open(pattern, holdout, scale, space, settled)
         for name in self.also:
             if Path(name).suffix and not is_pattern(name):
                 readable(Path(name))

@@ -21,7 +21,7 @@ from ...settings.groups import SettingsGroups
 from .. import run_log
 from ..console import Console
 from ..help import INPUT, RUN, VIDEO
-from ..names import is_batch
+from ..names import frames_at, holds_videos, is_batch, is_folder, is_frames_output
 from ..options import (
     Adapter,
     Colors,
@@ -79,6 +79,8 @@ def blur(
 
     Example: wgmb blur in.mp4 -o out.mp4 --shutter 180 --fps 60
 
+    Example: wgmb blur renders/ -o blurred/ --program vray
+
     Example: wgmb blur a.mp4 b.mkv -o out/ --fps 60
 
     Example: wgmb blur in.mp4 -o try.mp4 --try 5
@@ -96,7 +98,8 @@ def blur(
     Parameters
     ----------
     patterns
-        Frames: shot.####.exr, shot.%04d.exr, or one file. Or videos: files, folders, or patterns
+        Frames: shot.####.exr, shot.%04d.exr, one file, or a folder, in which picture, vectors and
+        depth are found by their names. Or videos: files, folders, or patterns
         such as 'clips/*.mp4'; for several, the output is a folder, or a name with {name}.
     job
         Job file of `wgmb job`, which holds all settings; --frames selects a part of the frames.
@@ -202,6 +205,25 @@ class BlurCall:
         return self.patterns[0], self.output
 
 
+def _is_folder_of_frames(call: BlurCall) -> bool:
+    pattern, output = call.files
+    if len(call.patterns) > 1 or not Path(pattern).is_dir():
+        return False
+    return is_frames_output(output.output) or not holds_videos(pattern)
+
+
+def _take_folder(call: BlurCall) -> int:
+    """Rendered frames, of which the folder alone was named."""
+    pattern, output = call.files
+    found = frames_at(pattern, call.groups.input, output.output)
+    call.console.say(found.text)
+    name = Path(found.pattern).name
+    if is_folder(output.output):
+        output = replace(output, output=str(Path(output.output) / name))
+    groups = replace(call.groups, input=found.input)
+    return _take_frames(replace(call, patterns=(found.pattern,), output=output, groups=groups))
+
+
 def _is_piped(call: BlurCall) -> bool:
     pattern, output = call.files
     return is_pipe(pattern) or is_pipe(output.output)
@@ -289,6 +311,11 @@ ROADS = (
         _is_piped,
         _take_pipe,
         dict.fromkeys(("--confidence", "--try", "--workers", "--cluster"), _ALONE),
+    ),
+    Road(
+        _is_folder_of_frames,
+        _take_folder,
+        {"--color-in": _FOR_PIPES, "--try": _TRIED},
     ),
     Road(
         _is_of_videos,

@@ -25,6 +25,7 @@ from ...sequence.layers import names
 from ...settings.color import ColorSettings
 from ..console import Console
 from ..exit_codes import DONE
+from ..names import frames_at
 from ..options import Colors, InputOptions, Inputs
 from ..spelling import as_options
 from ..terminal import out
@@ -69,11 +70,14 @@ def info(
         return tell_about(pattern, input.max_mb, scan)
     if scan:
         raise InputError("`scan` is for videos")
-    clip = input.open(pattern, space=color.space(shown))
+    found = frames_at(pattern, input)
+    clip = found.input.open(found.pattern, space=color.space(shown))
     Console().say(color.remark)
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
     lines = describe(clip, output, shown)
+    lines[1:1] = [("program", as_options(input.remark))] if input.remark else []
+    lines[:0] = [("folder", found.text)] if found.text else []
     for name, text in lines:
         out(f"{name:10}{text}")
     return DONE

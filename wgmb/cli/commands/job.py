@@ -20,6 +20,7 @@ from ...settings.color import ColorSettings
 from .. import submit
 from ..console import Console
 from ..exit_codes import DONE
+from ..names import frames_at
 from ..options import (
     Adapter,
     Colors,
@@ -98,12 +99,13 @@ def job(
     _check_target("--job", file, (".json",), is_job)
     _check_target("--openjd", openjd, (".yaml", ".yml"), is_ours)
     _check_target("--slurm", slurm, (".sh",), is_ours)
+    found = frames_at(pattern, input, output.output)
     request = BlurRequest(
-        pattern=pattern,
+        pattern=found.pattern,
         output=output,
         blur=blur,
         shutter=shutter,
-        input=input,
+        input=found.input,
         color=color,
         video=video,
         confidence=confidence,
@@ -125,7 +127,7 @@ def job(
     for path, text in texts.items():
         write_file(path, text.encode())
     console, finding = Console(quiet), made.findings.finding
-    console.say(*made.remarks, f"vectors: {finding.text}" if finding.notable else "")
+    console.say(found.text, *made.remarks, f"vectors: {finding.text}" if finding.notable else "")
     frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
     console.say(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE

@@ -10,10 +10,11 @@ from cyclopts import Parameter
 
 from ...errors import InputError, counted
 from ...io.data_files import FLO
-from ...output.vectors import PROGRAMS
+from ...output.vectors import FORMS
 from ...run.vectors import VectorsRequest
 from .. import run_log
 from ..console import Console
+from ..names import frames_at
 from ..options import Adapter, InputOptions, Inputs, LogJson, Quiet, Verbose
 
 
@@ -23,10 +24,10 @@ def vectors(
     input: Inputs = InputOptions(),
     *,
     output: Annotated[str, Parameter(alias="-o")],
-    program: Annotated[
+    form: Annotated[
         str | None,
         Parameter(
-            name="--as", help=f"Form of the vectors: {', '.join(PROGRAMS)}; of a .flo it is flo."
+            name="--as", help=f"Form of the vectors: {', '.join(FORMS)}; of a .flo it is flo."
         ),
     ] = None,
     max_displace: float | None = None,
@@ -61,15 +62,16 @@ def vectors(
         Print errors only.
     """
     run_log.begin(log_json, "vectors", output)
-    if program is None:
+    if form is None:
         if not output.lower().endswith(FLO):
-            raise InputError(f"`program` is missing: the form of {output}, {', '.join(PROGRAMS)}")
-        program = "flo"
+            raise InputError(f"`form` is missing: the form of {output}, {', '.join(FORMS)}")
+        form = "flo"
+    found = frames_at(pattern, input, output)
     request = VectorsRequest(
-        pattern=pattern,
+        pattern=found.pattern,
         output=output,
-        program=program,
-        input=input,
+        form=form,
+        input=found.input,
         max_displace=max_displace,
         overwrite=overwrite,
         resume=resume,
@@ -77,6 +79,7 @@ def vectors(
     run = request.open(adapter)
     clip, files = run.clip, run.output
     console = Console(quiet, verbose)
+    console.say(found.text, input.remark)
     console.detail(f"settings: {files.settings}")
     started = time.perf_counter()
     run_log.start([pattern], files.pattern, json.loads(files.settings), len(clip.numbers))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from ... import gpu
 from ...errors import DeviceError
@@ -11,6 +12,7 @@ from ...settings import size_of
 from ...settings.color import ColorSettings
 from ..console import Console
 from ..exit_codes import DONE
+from ..names import frames_at
 from ..options import (
     Adapter,
     BlurOptions,
@@ -78,6 +80,10 @@ def view(
     if config is not None:
         state = viewer.State.read(config)
     if what is not None:
+        if Path(what).is_dir():
+            found = frames_at(what, input)
+            what, input = found.pattern, replace(input, also=found.input.also)
+            Console().say(found.text)
         state = state.opened(what, input.max_mb)
     state = state.with_options(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
     if state.is_video and config is None and blur.method is None:

@@ -23,6 +23,7 @@ _COMPONENTS = (
     {"red": 0, "green": 1, "blue": 2, "alpha": 3},
 )
 _COLOR = ("combined", "rgba", "rgb", "beauty", "color", "colour", "image", "final", "noisy image")
+_TITLES = frozenset("".join(name.split()) for name in _COLOR)
 TRIPLES = {"normal": ("normal", "normals", "n")}
 """Layers of three channels, as stems of their names, by the input of a Frame that they are."""
 _DEPTH = ("depth", "z", "zdepth", "vrayzdepth", "worlddepth")
@@ -167,6 +168,17 @@ def _some_of_rgb(members: list[str]) -> list[str]:
     if not own.keys() & set("RGB"):
         return []
     return [own.get(c, "") for c in "RGB"] + [own[c] for c in "A" if c in own]
+
+
+def is_color(title: str) -> bool:
+    """True if a name says that it is the picture."""
+    return ending(title, _TITLES) is not None
+
+
+def is_depth(title: str) -> bool:
+    """True if a name says that it is depth."""
+    end = ending(title, _DEPTH)
+    return end is not None and not is_of_space(title, end)
 
 
 def find_depth(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -71,12 +72,20 @@ class ConventionFinder:
         if first is None:
             return self._none_found(self._stored.files.on_disk[0])
         if self._wanted.convention != "auto":
-            return first
+            return self._as_told(first)
         found = self._best([first, self._test(_picture, 1)])
         if found.is_failed:  # the light may have changed everywhere
             of_surfaces = [self._test(self._surfaces, which) for which in (0, 1)]
             found = self._best([found, *of_surfaces])
         return found
+
+    def _as_told(self, tested: vector_test.ConventionFinding) -> vector_test.ConventionFinding:
+        """The finding about vectors of a convention that was told: only their unit is found."""
+        told, own = self._wanted, tested.vectors
+        if told.is_told or (own and replace(own, scale=told.scale) == told):
+            return tested
+        text = f"{told}, of an unknown unit: `vector_scale` is twice the longest motion"
+        return vector_test.ConventionFinding(told, False, text, notable=True)
 
     @staticmethod
     def _best(
@@ -100,7 +109,7 @@ class ConventionFinder:
                 if len(named) <= which:
                     return found
                 own = named[which]
-                if self._wanted.convention != "auto":
+                if self._wanted.is_told:
                     return vector_test.ConventionFinding(own, False, str(own))
                 evidence.append(self._evidence(source, own, look))
                 has_both = self._has_both(source, own)
@@ -144,7 +153,7 @@ class ConventionFinder:
         for source in dict.fromkeys((first, *self._stored.all(number))):
             own, near = self._stored.own(source), source.reference_channel
             if named := vectors.named(own, self._wanted, near, source.units):
-                if self._wanted.convention != "auto":
+                if self._wanted.is_told:
                     return source, [vectors.in_pixels(named, source.whole)]
                 return source, vectors.readings(own, named, source.whole, near)
         return first, []

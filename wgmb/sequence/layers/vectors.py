@@ -86,6 +86,17 @@ class Vectors:
         return replace(self, scale=x if x == y else (x, y))
 
     @property
+    def is_told(self) -> bool:
+        """True if nothing about the numbers is to be found out: a convention with its unit.
+
+        Numbers around 0.5 count in units of the longest motion, or of pixels; only a scale tells.
+        """
+        if self.convention in ("auto", "none"):
+            return self.convention == "none"
+        has_unit = self.middle == 0 or CONVENTIONS[self.convention].of_picture
+        return has_unit or self.scale != 1
+
+    @property
     def middle(self) -> float:
         """The number that stands for no motion."""
         return CONVENTIONS[self.convention].offset if self.offset is None else self.offset
@@ -129,6 +140,13 @@ def named(
         if _find(by_layer, convention):
             return replace(wanted, convention=name)
     return replace(wanted, convention="plain") if wanted.layer is not None else None
+
+
+def direction_of(title: str) -> int | None:
+    """-1 if a name says that it is motion to the previous frame, 1 for other motion, else None."""
+    if ending(title, _BACKWARD):
+        return -1
+    return 1 if ending(title, STEMS) else None
 
 
 def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> list[str]:

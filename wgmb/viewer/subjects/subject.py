@@ -136,7 +136,7 @@ class ClipSubject:
         self._headers: dict[tuple, FrameFile] = {}  # what the frames say of their colours
         self._layers: dict[tuple, dict[str, str]] = {}
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
-        self._sharp, self._around = Blur("tap", device=device), PanoramaCanvas()
+        self._sharp, self._panorama = Blur("tap", device=device), PanoramaCanvas()
         self._uploads: OrderedDict[tuple, _Uploads] = OrderedDict()
         self._now = self._which(state)
 
@@ -262,7 +262,7 @@ class ClipSubject:
         self._uploads.move_to_end(key)
         kept = self._uploads[key]
         if is_whole and frame.wrap == "on":
-            frame = self._around.of(frames_around(frame, method), blur.extent)
+            frame = self._panorama.of(frames_around(frame, method), blur.extent)
         which = self._now, frame.size
         if kept.which != which:
             kept.which = None
