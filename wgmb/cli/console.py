@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..errors import counted
 from ..io.frame_numbers import frame_list, numbered
-from ..run.report import BatchReport, VideoReport
+from ..run.report import UNFOLLOWED, BatchReport, VideoReport
 from ..sequence.frame_builder import ALONE
 from ..sequence.frame_file import odd_sizes
 from . import terminal
@@ -109,6 +109,7 @@ def pictures_told(report: VideoReport, fills: bool) -> list[str]:
         cuts_told(report.cuts, "picture") if report.cuts else "",
         f"flash at picture {flashes}" if flashes else "",
         alone_told(report.alone),
+        unfollowed_told(report.unfollowed),
         repeats_told(report.repeated) if fills else "",
         report.held_out,
         report.scaling,
@@ -118,6 +119,14 @@ def pictures_told(report: VideoReport, fills: bool) -> list[str]:
 def alone_told(numbers: Sequence[int]) -> str:
     """The line about pictures that are copied as nothing is beside them; "" where none is."""
     return f"{numbered(sorted(numbers), 'picture')}: {ALONE}" if numbers else ""
+
+
+def unfollowed_told(numbers: Sequence[int]) -> str:
+    """The line about pictures in which motion was not found; "" where there are none."""
+    if not numbers:
+        return ""
+    at = numbered(sorted(numbers), "picture")
+    return f"{at}: {UNFOLLOWED}; a recording with more frames per second would help"
 
 
 def repeats_told(count: int) -> str:

@@ -138,9 +138,17 @@ def logged_video(tick: Tick | Progress, output: str | Path) -> Callable[[int, st
 
 
 def video(
-    source: str | Path, output: str | Path, status: str, seconds: float, reason: str = ""
+    source: str | Path,
+    output: str | Path,
+    status: str,
+    seconds: float,
+    reason: str = "",
+    unfollowed: Sequence[int] = (),
 ) -> None:
-    """Log the end of a video, or that it failed."""
+    """Log the end of a video, or that it failed.
+
+    `unfollowed`: numbers of the pictures in which a place stays sharp.
+    """
     if _log is not None:
         _log.write(
             "video",
@@ -149,6 +157,7 @@ def video(
             status=status,
             seconds=round(seconds, 3),
             reason=reason,
+            unfollowed=list(unfollowed),
         )
 
 

@@ -33,6 +33,7 @@ from ..video.planes import Planes
 from ..video.thumbnail import Thumbnail, is_cut
 from .conversion import RateConversion, RateConversionStages
 from .file_sink import BlurredFrame
+from .report import UNFOLLOWED
 from .stages import ReadFrame, Stages
 
 
@@ -221,13 +222,18 @@ class PictureStages(Stages):
                 encoder = exposures.device.create_command_encoder(label="result")
                 picture = self._images.download(encoder, exposure.light())
         if source.number in textures.alone:
-            on = self.clip.notes.setdefault(ALONE, [])
-            on += [source.number] if source.number not in on else []
+            self._note(ALONE, source.number)
+        if source.number in textures.unfollowed:
+            self._note(UNFOLLOWED, source.number)
         if source.rgba.shape[2] == 3:
             picture = picture[..., :3]
         elif picture.shape[2] == 3:
             picture = np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
         return Result(source, np.ascontiguousarray(picture, np.float32))
+
+    def _note(self, text: str, number: int) -> None:
+        on = self.clip.notes.setdefault(text, [])
+        on += [number] if number not in on else []
 
     def _cells(self, here: int, pictures: ClipPictures) -> list[Cell]:
         if self._shutter.rolling is not None:

@@ -26,6 +26,10 @@ class Failure(str):
         return made
 
 
+UNFOLLOWED = (
+    "something moves too far to be followed, or is there in one picture alone: it stays sharp"
+)
+"""Remark on pictures with a place whose motion was not found."""
 MOST_ROWS = 20  # of a report in a notebook, of a kind
 
 
@@ -134,6 +138,8 @@ class VideoReport:
     """False if it had been finished before (`resume`)."""
     held_out: str = ""
     """A line about displays that stay sharp, if any were found."""
+    unfollowed: list[int] = field(default_factory=list)
+    """Numbers of the pictures in which a place stays sharp, as its motion was not found."""
 
 
 def describe_input(report: BatchReport, clip: Clip) -> None:

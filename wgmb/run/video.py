@@ -232,6 +232,7 @@ class VideoRun:
             cuts=sorted(shots.cuts) if shots else [],
             flashes=shots.flashes if shots else [],
             alone=exposures.alone,
+            unfollowed=exposures.unfollowed,
             repeated=len(shots.doubles) if shots else 0,
             is_new=shots is not None,
             held_out=exposures.holdout.message,

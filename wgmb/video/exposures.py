@@ -81,6 +81,13 @@ class Exposures:
         return sorted(self._frames.alone.difference(self.shots.flashes))
 
     @property
+    def unfollowed(self) -> list[int]:
+        """Numbers of the pictures with a place whose motion was not found; no flashes."""
+        if self._frames is None or self.shots is None:
+            return []
+        return sorted(self._frames.unfollowed.difference(self.shots.flashes))
+
+    @property
     def methods(self) -> list[str]:
         """Names of the methods that blurred pictures so far, the usual one first."""
         blurs = [self._blur, *([self._at_edges] if self._at_edges else [])]

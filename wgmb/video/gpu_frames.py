@@ -32,7 +32,8 @@ class VideoFrames:
     `motion`: where motion comes from, or None. `holdout`: areas that stay sharp, where there is
     motion. `planes`: make their light; motion is searched in light that is not expanded.
     `changing`: adds changes of light, for all that blur pictures of `shots`. Numbers of pictures
-    that are copied, as none of their shot is beside them to find motion from, are `alone`.
+    that are copied, as none of their shot is beside them to find motion from, are `alone`; those
+    with a place whose motion was not found are `unfollowed`.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class VideoFrames:
         self._holdout = holdout or Holdout(displays=False)
         self._held = self._holdout.of(shots)
         self.alone: set[int] = set()
+        self.unfollowed: set[int] = set()
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, tuple[int, FrameViews]] = {}  # by the place of their textures
@@ -117,6 +119,9 @@ class VideoFrames:
             if self._source is not None:
                 self.alone.add(self._shots[index].number)
             return FrameViews(color=light, key=object())
+        held = self._held(index)
+        if self._source is not None and self._source.is_unfollowed(index, held):
+            self.unfollowed.add(self._shots[index].number)
         (motion, depth), factors = found, self._factors(index)
         if factors != (1.0, 1.0):
             motion = self._paced(motion, f"motion {index % KEPT}", factors)
@@ -124,7 +129,7 @@ class VideoFrames:
             color=light,
             motion=motion.create_view(),
             depth=depth and depth.create_view(),
-            holdout=self._held_out(index),
+            holdout=self._held_out(index, held),
             key=object(),
         )
 
@@ -143,9 +148,9 @@ class VideoFrames:
             self._planes.draw(coded, texture)
         return texture
 
-    def _held_out(self, index: int) -> View | None:
-        """Mask of the areas of a picture that stay sharp."""
-        plane, texel = self._held(index), TEXTURES["holdout"]["format"]
+    def _held_out(self, index: int, plane: np.ndarray | None) -> View | None:
+        """View of the mask of the areas of a picture that stay sharp."""
+        texel = TEXTURES["holdout"]["format"]
         if plane is None:
             return None
         if plane is not self._holdout.mask:

@@ -17,6 +17,7 @@ from ..shots.reader import Shots
 from .planes import Planes
 from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
+from .unfollowed import is_unfollowed
 
 Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]
 
@@ -39,6 +40,7 @@ class VideoMotion(ShotMotion):
         is_on_gpu = isinstance(source, Flow | DenseInverseSearch)
         picture = searched.texture if is_on_gpu else searched.grey
         super().__init__(source, picture, shots.moves_on, depth)
+        self._grey = searched.grey
         self._device, self._images = device, TexturePool(device)
         self._ragged = RaggedMotion(device)
 
@@ -78,6 +80,19 @@ class VideoMotion(ShotMotion):
         """The greatest change of a picture's motion within a tile [px], infinite if not known."""
         shot = self.shot(index)
         return shot.change(index) if isinstance(shot, PlaceShot) else math.inf
+
+    def is_unfollowed(self, index: int, held: Any) -> bool:
+        """Return True if a place of a picture was not followed (see unfollowed.py).
+
+        `held`: areas that are to stay sharp, None where there are none. Motion that is made and
+        kept on the GPU is not looked at, so this is False.
+        """
+        shot = self.shot(index)
+        motion = shot.motion(index) if isinstance(shot, DisShot) else None
+        if motion is None:
+            return False
+        near = (i if self._moves_on(index, i) else None for i in (index - 1, index, index + 1))
+        return is_unfollowed([None if i is None else self._grey(i) for i in near], motion, held)
 
     def depth(self, index: int) -> wgpu.GPUTexture | None:
         """The depth of a picture whose motion was uploaded without; None where there is none."""

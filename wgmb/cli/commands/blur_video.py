@@ -23,7 +23,7 @@ from ...settings import OutputSettings
 from ...settings.video import VideoSettings
 from ...video.write.encoders import SUFFIXES, chosen
 from .. import run_log
-from ..console import Console, alone_told, pictures_told, repeats_told
+from ..console import Console, alone_told, pictures_told, repeats_told, unfollowed_told
 from ..estimate import Estimate
 from ..exit_codes import DONE, SOME_FAILED
 from ..names import is_batch, outputs_of, videos_of
@@ -161,14 +161,16 @@ def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -
 def _log_end(report: VideoReport) -> None:
     """Log a video that exists, with its losses."""
     status = "done" if report.is_new else "skipped"
-    run_log.video(report.path, report.output, status, report.seconds, report.loss)
+    run_log.video(
+        report.path, report.output, status, report.seconds, report.loss, report.unfollowed
+    )
 
 
 def _remarks(report: VideoReport, run: VideoRun) -> list[str]:
     """Lines on the peculiarities of a video; some are empty."""
     fills = report.is_new and run.request.video.duplicates == "fill"
     repeats, alone = repeats_told(report.repeated) if fills else "", alone_told(report.alone)
-    return [alone, repeats, report.held_out, report.scaling]
+    return [alone, unfollowed_told(report.unfollowed), repeats, report.held_out, report.scaling]
 
 
 def _reason(error: BaseException, path: Path) -> str:
