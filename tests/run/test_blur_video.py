@@ -2,7 +2,7 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields
+from dataclasses import fields, replace
 from fractions import Fraction
 
 import av
@@ -20,7 +20,7 @@ from wgmb.color.srgb import linear, srgb, to_display
 from wgmb.extras import install_command
 from wgmb.run import video_output
 from wgmb.run.video import VideoKeywords, VideoRequest, blur_video
-from wgmb.settings import BlurSettings, OutputSettings, ShutterSettings
+from wgmb.settings import BlurSettings, InputSettings, OutputSettings, ShutterSettings
 from wgmb.settings.video import FlowSettings, VideoSettings
 from wgmb.video.read.reader import VideoReader
 
@@ -518,3 +518,31 @@ def test_every_setting_of_a_video_is_a_keyword():
         "cuts",
         "max_mb",
     }
+
+
+def test_a_run_holds_no_more_than_a_small_video_justifies(tmp_path, device):
+    """Without a GPU, the textures of gather are in memory too."""
+    frames = [Image.new("L", (1920, 1280))] * 2
+    frames[0].save(path := tmp_path / "s.gif", save_all=True, append_images=frames[1:])
+    request = VideoRequest(blur=BlurSettings(method="gather"))
+    averages = VideoRequest(video=VideoSettings(flow="none"))
+    more = replace(request, input=InputSettings(max_mb=4800))
+    output = OutputSettings(output="x.mkv", fps="24")
+    for one in (averages, more):
+        assert one.open(device).plan(path, output).reader.size == (1920, 1280)
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        return
+    run = request.open(device)
+    with pytest.raises(InputError, match=r"s\.gif: a file of .* 1200 MB; `max_mb=4800` allows it"):
+        run.plan(path, output)
+    path.write_bytes(path.read_bytes() + bytes(80_000))  # which might hold as many pixels
+    assert run.plan(path, output).reader.size == (1920, 1280)
+
+
+def test_frames_whose_motion_is_found_hold_no_more_than_their_files_justify(tmp_path, capsys):
+    for n in range(3):
+        Image.new("RGB", (640, 480)).save(tmp_path / f"a.{n}.png")
+    words = ["blur", tmp_path / "a.#.png", "-o", tmp_path / "o.#.png", "-q"]
+    text = run(capsys, *words, "--max-mb", "100", code=1)
+    assert text.count("pictures of 640 x 480 takes 30 MB; --max-mb 118 allows it") == 3
+    run(capsys, *words, "--max-mb", "118")

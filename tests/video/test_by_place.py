@@ -15,6 +15,7 @@ import cv2
 
 from wgmb.flow.dis import Dis
 from wgmb.flow.dis.by_place import ByPlace
+from wgmb.video import gpu_frames
 
 WIDTH, HEIGHT, COUNT = 320, 180, 5
 
@@ -181,6 +182,35 @@ def test_pictures_without_edges_of_motion_are_tapped(device):
     tapped = wgmb.blur_pictures(pictures, device=device, method="tap")
     for one, two in zip(auto, tapped, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+def test_pictures_that_stand_are_copied_and_not_searched(device, monkeypatch):
+    """A picture with the samples of its neighbours is copied; one sample more, and it is searched."""
+    if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
+        pytest.skip("a GPU searches in its own memory")
+    searched = []
+    original = ByPlace.motion
+    monkeypatch.setattr(ByPlace, "motion", lambda *args: searched.append(1) or original(*args))
+    still = np.rint(200 * texture(WIDTH, HEIGHT, 9, 3)).astype("u1")
+    for one in wgmb.blur_pictures([still] * 5, device=device):
+        np.testing.assert_array_equal(one, still)
+    assert not searched
+    other = still.copy()
+    other[-1, -1, 2] += 1
+    list(wgmb.blur_pictures([still, still, still, other, other, other], device=device))
+    assert len(searched) == 2  # of the two pictures that differ from one beside them
+
+
+def test_standing_beside_what_moves_changes_no_bit(device, monkeypatch):
+    """A picture that moves is blurred as if those that stand beside it were searched."""
+    moving = list(shot(24, 40, "textured"))
+    pictures = [moving[0]] * 3 + moving[1:3] + [moving[3]] * 3
+    got = list(wgmb.blur_pictures(pictures, device=device))
+    monkeypatch.setattr(gpu_frames, "is_same", lambda *_: False)
+    want = list(wgmb.blur_pictures(pictures, device=device))
+    for n in (2, 3, 4, 5):
+        np.testing.assert_array_equal(got[n], want[n])
+    np.testing.assert_array_equal(got[1], pictures[1])
 
 
 def test_auto_alone_is_made_better_by_place(device):

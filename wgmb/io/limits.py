@@ -21,6 +21,13 @@ MAX_MB = 4096
 """Megabytes that a file may unpack to unless another limit is given."""
 _TIMES = 500  # as much as the file holds: then it is all but empty, or was made to do harm
 _SHARE = 4  # and may take this part of the limit
+AVERAGED, MOVED, GATHERED = 25, 51, 128
+"""Values of 32 bits that a run holds of a pixel of a video, whose textures may be in memory too.
+
+Where pictures are averaged: decoded and coded ones, eight as planes, five as light, the sums;
+measured with GIFs of 8 and of 20 megapixels. An encoder that looks ahead adds 3 bytes for each
+picture that it holds. Where motion is searched without a GPU: if they are blurred by tap alone, and
+by other methods; measured at 8 megapixels."""
 INDEX_SHARE = 8
 """Part of the limit that a file's index, and the search for its form, may take."""
 _INDEX_ENTRY = 64  # bytes that an entry of an index takes in memory, at most
@@ -30,6 +37,24 @@ LARGEST_INDEX = 64 << 20  # bytes that a compressed index may unpack to
 def unpacked(size: tuple[int, int], channels: int) -> int:
     """Bytes of so many channels of `size` pixels as float32, their form here."""
     return 4 * size[0] * size[1] * channels
+
+
+def check_held(
+    path: Path, size: tuple[int, int], channels: int, stored: int, max_mb: float
+) -> None:
+    """Raise InputError where a run would hold more of pictures of `size` than a file justifies.
+
+    `channels`: values of 32 bits that it holds of a pixel. Only a picture that unpacks to over 500
+    times the file's `stored` bytes is judged: a quarter of `max_mb` may be held for it.
+    """
+    most, needed = max_mb / _SHARE * 2**20, unpacked(size, channels)
+    if unpacked(size, 4) <= _TIMES * stored or needed <= most:
+        return
+    raise InputError(
+        f"{path}: a file of {stored:,} bytes may take {max_mb / _SHARE:g} MB of memory, but to "
+        f"blur its pictures of {size[0]} x {size[1]} takes {-(-needed // 2**20)} MB; "
+        f"`max_mb={-(-needed * _SHARE // 2**20)}` allows it"
+    )
 
 
 def check(path: Path, name: str, promised: int, stored: int, max_mb: float) -> None:

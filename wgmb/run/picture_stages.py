@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..exposure import Cell, cells_in_shot
 from ..frame import Frame
 from ..gpu.textures import TexturePool
+from ..io import limits
 from ..output.result import Result
 from ..pipeline.blur import Blur
 from ..sequence import panorama_signs
@@ -50,18 +51,35 @@ class ClipPictures:
         self._clip, self._view, self._is_search = clip, view, cuts
         self._kept: dict[int, Picture[Thumbnail]] = {}
         self._cuts: dict[int, bool] = {}
+        self._refused: dict[int, InputError] = {}
 
     def __getitem__(self, index: int) -> Picture[Thumbnail]:
         """A frame; KeyError where there is none, InputError or OSError where it is not readable."""
         if index not in self._kept:
             if not self._clip.cache.files.is_there(index):
                 raise KeyError(index)
-            coded = _coded(self._clip.source(index, self._view).rgba)
+            coded = self._read(index)
             for kept in (self._kept, self._cuts):
                 for old in [n for n in kept if abs(n - index) > 2 * REACH]:
                     del kept[old]
             self._kept[index] = Picture(float(index), Thumbnail(coded), index)
         return self._kept[index]
+
+    def _read(self, index: int) -> CodedPicture:
+        if index in self._refused:
+            raise self._refused[index]
+        source = self._clip.source(index, self._view)
+        height, width = source.rgba.shape[:2]
+        stored = source.path.stat().st_size
+        try:
+            limits.check_held(
+                source.path, (width, height), limits.AVERAGED, stored, self._clip.max_mb
+            )
+        except InputError as error:
+            self._refused[index] = error
+            self._clip.forget(index)
+            raise
+        return _coded(source.rgba)
 
     def same_shot(self, index: int, other: int) -> bool:
         """As `moves_on`: a frame stands for its own interval alone."""

@@ -14,6 +14,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError, check_choice, did_you_mean_setting
 from ..extras import install_command, is_installed
+from ..io import limits
 from ..methods import check_method
 from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
@@ -160,11 +161,24 @@ class VideoRun:
         """Open a video; InputError if it cannot be read or has no pictures in the range."""
         video = self.request.video
         check_output(output, video, path)
-        reader = VideoReader(path, max_mb=self.request.input.max_mb)
+        max_mb = self.request.input.max_mb
+        reader = VideoReader(path, max_mb=max_mb)
+        stored = reader.path.stat().st_size
+        limits.check_held(reader.path, reader.size, self._held, stored, max_mb)
         clock = video.clock(reader, self.request.input.frames, sounds_kept(reader, output, video))
         fps, said = _rate(reader, output)
         wanted = OutputFrames(reader, clock, fps, video.longest_pause)
         return VideoPlan(reader, output, video, clock, wanted, said, self.request.shutter.remark)
+
+    @property
+    def _held(self) -> int:
+        """Values that are held of a pixel; see limits. A GPU has its own memory for textures."""
+        is_on_gpu = self.blur.device.adapter_info["adapter_type"] != gpu.SOFTWARE
+        if self.motion is None or is_on_gpu:
+            return limits.AVERAGED
+        is_tapped = self.blur.method.name == "tap" and self.at_edges is None
+        is_quick = self.request.video.chosen(self.blur.device)[0].flow == "dis"
+        return limits.MOVED if is_tapped and is_quick else limits.GATHERED
 
     def at(self, fps: Fraction | None) -> VideoRun:
         """The same with its shutter in degrees, of frames at this rate of the output.

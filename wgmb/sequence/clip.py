@@ -88,7 +88,7 @@ class Clip:
         InputError for missing files, gaps and settings that do not fit.
         """
         _check_kind(pattern)
-        self._space, self._findings, self._max_mb = space, settled, max_mb
+        self._space, self._findings, self.max_mb = space, settled, max_mb
         self._cut_list = CutList(cuts or "")
         self.pattern, self.passes, self.view = str(pattern), passes or Passes(), view
         self._files = SequenceFiles(self.pattern, self.passes.also, settled)
@@ -112,13 +112,13 @@ class Clip:
             known_cuts=self._known_cuts,
             view=self.view,
             space=self._space,
-            max_mb=self._max_mb,
+            max_mb=self.max_mb,
         )
         self.sizes, self.notes, self.unread = cache.sizes, cache.notes, cache.unread
         self.notes |= files.gaps(self.numbers)
         patterns = [str(pattern) for pattern in files.every_pattern]
         self.masks = Masks(
-            passes.holdout, passes.scale, patterns, self.numbers, self._max_mb, files.of_views
+            passes.holdout, passes.scale, patterns, self.numbers, self.max_mb, files.of_views
         )
         self._finder = ConventionFinder(cache, known.finding if known else None)
         self.dependencies = Dependencies(files, self.masks, (passes.camera, self._cut_list.path))

@@ -20,7 +20,7 @@ from .holdouts import Holdout
 from .motion import VideoMotion
 from .planes import Planes
 from .ragged import KEPT
-from .thumbnail import Thumbnail
+from .thumbnail import Thumbnail, is_same
 
 EDGE = float(wgsl.load("methods/gather/tiles/active_tiles.wgsl").constant("EDGE"))  # px
 LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
@@ -57,12 +57,16 @@ class VideoFrames:
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
         self._frames: dict[int, tuple[int, FrameViews]] = {}  # by the place of their textures
+        self._same: dict[int, bool] = {}  # whether a picture is that before it, by index
 
     def in_shot(self, index: int, blur: Blur | None = None) -> FrameInShot:
         """A picture, between its neighbours if the method takes them, of `blur` if not of its own.
 
         Their textures may be overwritten once two others have been requested.
         """
+        number = self._shots[index].number
+        if self._is_still(index):
+            return FrameInShot(FrameViews(color=self._light(index).create_view()), number=number)
         wanted = [index]
         method = (blur or self._blur).method
         takes = method.needs | method.uses
@@ -71,7 +75,7 @@ class VideoFrames:
         views = {i: self._frame(i, "depth" in takes) for i in wanted}
         near = (views.get(i) for i in (index - 1, index + 1))
         before, after = (one if one is not None and one.has_vectors else None for one in near)
-        return FrameInShot(views[index], before, after, self._shots[index].number)
+        return FrameInShot(views[index], before, after, number)
 
     def change(self, cell: Cell, begins: bool) -> bool:
         """Submit the changes of light in the part `cell` of an exposure.
@@ -79,8 +83,10 @@ class VideoFrames:
         `begins`: it is the first part that does. False where there is no motion.
         """
         index = cell.index
+        if cell.shutter.degrees <= 0 or self._is_still(index):
+            return False
         frame = self._frame(index)
-        if frame.motion is None or cell.shutter.degrees <= 0:
+        if frame.motion is None:
             return False
         near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
         factors = self._factors(index)
@@ -93,11 +99,27 @@ class VideoFrames:
 
     def has_edges(self, cell: Cell) -> bool:
         """True if the motion of a picture has edges within its exposure, as gather looks for."""
-        if self._source is None:
+        if self._source is None or self._is_still(cell.index):
             return False
         times = cell.shutter.span
         longest = max(abs(time) for time in times) * max(self._factors(cell.index))
         return longest * self._source.change(cell.index) > EDGE
+
+    def _is_still(self, index: int) -> bool:
+        """True if motion leads to pictures beside one, and all of them are the same."""
+        if self._source is None:
+            return False
+        near = [side for side in (0, 1) if self._shots.moves_on(index - 1 + side, index + side)]
+        return bool(near) and all(self._repeats(index + side) for side in near)
+
+    def _repeats(self, index: int) -> bool:
+        """True if a picture is the same as the one before it; compared once."""
+        if index not in self._same:
+            for old in [i for i in self._same if abs(i - index) > LIGHTS]:
+                del self._same[old]
+            before, here = (self._shots[i].content for i in (index - 1, index))
+            self._same[index] = is_same(before, here)
+        return self._same[index]
 
     def _frame(self, index: int, depth: bool = False) -> FrameViews:
         """The views of one picture. `depth`: whether it is wanted, if it is found only then."""

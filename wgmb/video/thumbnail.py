@@ -23,6 +23,7 @@ from .planes.matrices import from_samples
 _LUMA = 77, 150, 29  # of 256: ITU-R BT.601
 _LUMA_ROWS = 4  # of a block of pixels, that are averaged
 _CHROMA = 2  # rows and columns of a block, for the other planes
+_BAND = 64  # rows that are compared at once
 _WHITE = {PQ: 0.58, HLG: 0.75}  # signal of the white of text and paper (ITU-R BT.2408)
 
 
@@ -159,6 +160,22 @@ def _sum(parts: list[np.ndarray], kind: type) -> np.ndarray:
 def is_cut(before: Thumbnail, after: Thumbnail) -> bool:
     """Return True if a cut lies between two pictures."""
     return smalls_differ(before.small, after.small)
+
+
+def is_same(one: Thumbnail, other: Thumbnail) -> bool:
+    """Return True if two pictures have the same samples."""
+    if one is other:
+        return True
+    pairs = zip(one.coded.planes, other.coded.planes, strict=True)
+    return one.coded.coding == other.coded.coding and all(_equal(a, b) for a, b in pairs)
+
+
+def _equal(a: np.ndarray, b: np.ndarray) -> bool:
+    """Equality of two planes; most planes that differ do so in the first band of rows."""
+    return a.shape == b.shape and all(
+        np.array_equal(a[top : top + _BAND], b[top : top + _BAND])
+        for top in range(0, len(a), _BAND)
+    )
 
 
 def change(before: Thumbnail, after: Thumbnail) -> np.ndarray:

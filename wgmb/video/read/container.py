@@ -19,12 +19,6 @@ from ...io import limits, watch
 from ...io.frame_numbers import readable
 from .boxes import boxes, check_counts
 
-HELD_CHANNELS = 25
-"""Channels as float32 that a run holds of a picture, whose textures may be in memory as well.
-
-Decoded and coded pictures, eight as planes, five as light, the sums: 100 bytes a pixel, measured
-with GIFs of 8 and of 20 megapixels. An encoder that looks ahead adds 3 bytes for each picture.
-"""
 _MOST_PIXELS = 2**31 - 1  # that FFmpeg's option takes
 _BEGINNING = 1 << 20  # bytes
 _LONGEST = 60.0, 60.0  # seconds that opening, and reading once, may take
@@ -89,7 +83,7 @@ def largest_picture(stored: int, max_mb: float) -> dict[str, str]:
 
     Codecs round sizes up to their blocks, so that it is an eighth more.
     """
-    most = limits.most_pixels(stored, HELD_CHANNELS, max_mb)
+    most = limits.most_pixels(stored, limits.AVERAGED, max_mb)
     return {"max_pixels": str(min(most + most // 8, _MOST_PIXELS))}
 
 

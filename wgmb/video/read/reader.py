@@ -35,7 +35,7 @@ from ..pixels import (
 )
 from ..write.encoders import Facts
 from .color_tags import assumed, either, tags_of
-from .container import HELD_CHANNELS, has_alpha_beside, opened, picture_stream, size_of
+from .container import has_alpha_beside, opened, picture_stream, size_of
 from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
 from .rotation import rotation_of
@@ -131,7 +131,7 @@ class VideoReader:
             raise InputError(f"{self.path}: animated WebP is not read; GIF, APNG and AVIF are")
         stored = self.path.stat().st_size
         if not (width and height):  # FFmpeg forgets sizes over its limit
-            most = limits.most_pixels(stored, HELD_CHANNELS, self._max_mb)
+            most = limits.most_pixels(stored, limits.AVERAGED, self._max_mb)
             raise InputError(
                 f"{self.path}: no size of its pictures can be read: it is cut off, or they have "
                 f"over {most:,} pixels, which a file of {stored:,} bytes may not ask for; "
@@ -142,7 +142,7 @@ class VideoReader:
                 f"{self.path}: pictures of {width} x {height}, expected 1 to "
                 f"{limits.MOST_PIXELS_A_SIDE} pixels a side"
             )
-        promised = limits.unpacked((width, height), HELD_CHANNELS)
+        promised = limits.unpacked((width, height), limits.AVERAGED)
         limits.check(self.path, f"{width} x {height}", promised, stored, self._max_mb)
 
     def _probe(self) -> None:

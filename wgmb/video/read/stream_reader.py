@@ -22,7 +22,6 @@ from ..pixels import is_transparent, layout, planes_of
 from ..write.encoders import Facts
 from .color_tags import COLORS, assumed, either, tags_of
 from .container import (
-    HELD_CHANNELS,
     READERS,
     bound_pictures,
     largest_picture,
@@ -124,7 +123,7 @@ class StreamReader:
         if not 0 < min(size) <= max(size) <= limits.MOST_PIXELS_A_SIDE:
             raise InputError(f"{self.name}: pictures of {size[0]} x {size[1]}, expected 1 to "
                              f"{limits.MOST_PIXELS_A_SIDE} pixels a side")  # fmt: skip
-        promised = limits.unpacked(size, HELD_CHANNELS)
+        promised = limits.unpacked(size, limits.AVERAGED)
         limits.check(Path(self.name), f"{size[0]} x {size[1]}", promised, promised, max_mb)
 
     def pictures(self) -> Iterator[tuple[int, CodedPicture]]:
