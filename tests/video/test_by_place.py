@@ -185,7 +185,7 @@ def test_pictures_without_edges_of_motion_are_tapped(device):
 
 
 def test_pictures_that_stand_are_copied_and_not_searched(device, monkeypatch):
-    """A picture with the samples of its neighbours is copied; one sample more, and it is searched."""
+    """A picture is copied if its neighbours have the same samples; one other sample suffices."""
     if device.adapter_info["adapter_type"] != gpu.SOFTWARE:
         pytest.skip("a GPU searches in its own memory")
     searched = []

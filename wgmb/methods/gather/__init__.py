@@ -40,8 +40,8 @@ class Gather:
 
     `shading`: light that moves over surfaces, as shadows and reflections do, is followed too, where
     the passes of light of the frame and of a neighbour separate it from the surfaces (see
-    Frame.diffuse_light). "auto": by these, if the frame has them, else clear shadows on surfaces
-    that rest, by their colours; "passes": by the passes, and an InputError if it has none;
+    Frame.diffuse_light). "auto": by these, if the frame has them, else clear shadows on static
+    surfaces, by their colours; "passes": by the passes, and an InputError if it has none;
     "frames": shadows by the colours alone everywhere, which is less sure; "off": shading stays that
     of the frame.
 
@@ -53,10 +53,10 @@ class Gather:
     frame and both neighbours hide; it takes half as long again, and more memory.
 
     Strong: the closest to the truth. Reveals hidden surfaces, blurs across silhouettes.
-    Artefacts: without passes of light, shading is that of one frame, but for clear shadows on what
-    rests; surfaces hidden in all frames are filled from their surroundings; those that move more
-    than 256 px by a sample's time may be missed; costs 7 to 30 times as much as taps, and several
-    times that where light moves.
+    Artefacts: without passes of light, shading is that of one frame, but for clear shadows on
+    static surfaces; surfaces hidden in all frames are filled from their surroundings; those that
+    move more than 256 px by a sample's time may be missed; costs 7 to 30 times as much as taps, and
+    several times that where light moves.
     """
 
     name = "gather"
@@ -77,9 +77,9 @@ class Gather:
         ] = "color"
         shading: Annotated[
             Shading,
-            "moving shadows and reflections: followed by the passes of light, without them clear "
-            "shadows on what rests (auto); by the passes, which are required (passes); shadows by "
-            "the colours (frames); off: as in the frame",
+            "moving shadows and reflections: auto follows them by the passes of light, or, without "
+            "passes, follows clear shadows on static surfaces; passes requires the passes; frames "
+            "follows shadows by the colours; off leaves them as in the frame",
         ] = "auto"
         where: Annotated[
             Literal["everywhere", "edges"],

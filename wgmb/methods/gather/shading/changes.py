@@ -91,7 +91,7 @@ def changes(
     stage's change flags are told. Known in the tiles that `screen` has found doubtful.
     """
     here = frames[0]
-    distrusts = by_color and not stage.resting  # of what rests, texture is in register
+    distrusts = by_color and not stage.resting  # texture of static surfaces is in register
     plain = {}
     for offset, frame in frames.items():
         plain[offset] = (stage.texture if offset else stage.sparse)(f"plain {offset}", "r32uint")

@@ -25,7 +25,7 @@ from .stage import FOLDER, GATES_SIZE, Stage
 from .values import values
 
 _LISTS = "doubtful", "changing", "beside", "near", "whole"  # of tiles: see near.wgsl
-LONGEST = 480  # px of light along the longer side of an image, on what rests, at most
+LONGEST = 480  # px of light along the longer side of an image, on static surfaces, at most
 LEAST_NODES, MOST_NODES = 4, 8  # times of an exposure at which light is known,
 NODES_PER_INTERVAL = 12  # as many in a frame interval within these bounds
 
