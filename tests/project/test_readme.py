@@ -96,6 +96,8 @@ def desk(tmp_path, monkeypatch):
     for n in (1, 2, 3):
         name = pattern.name.replace("####", f"{n:04d}")
         (tmp_path / name.replace("shot", "blurred")).hardlink_to(name)
+    (tmp_path / "renders").mkdir()
+    make.write_sequence(tmp_path / "renders", (1, 2, 3))
     for name in ("truth", "vecblur"):
         make.write_exr(tmp_path / f"{name}.exr", make.frame(2))
     make_clips.write(tmp_path / "in.mp4", tone=0.1)

@@ -51,12 +51,12 @@ def _put(
     motion: np.ndarray,
     dominant: list[np.ndarray],
     level: Reduced,
-    there: np.ndarray,
+    region: np.ndarray,
     box: np.ndarray,
 ) -> None:
     """Write the dominant motion where a plane of the level, within its box, is true."""
     left, top, wide, high = box[:4].tolist()
-    part = there[top : top + high, left : left + wide].astype(np.uint8)
+    part = region[top : top + high, left : left + wide].astype(np.uint8)
     (y0, y1), (x0, x1) = (
         (round(first * level.factor), min(round((first + n) * level.factor), size))
         for first, n, size in ((top, high, motion.shape[0]), (left, wide, motion.shape[1]))
