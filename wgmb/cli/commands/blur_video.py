@@ -1,7 +1,8 @@
 """`wgmb blur` of videos: one or several, into videos or into frames.
 
 One video has several lines of messages, and its error ends the command. Of several, which share a
-progress bar, each has one line, and one that fails is reported.
+progress bar, each has a line at its end, and one before it if something is lost or assumed; one
+that fails is reported.
 """
 
 from __future__ import annotations
@@ -137,8 +138,14 @@ def _blur_each(
 
 
 def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -> bool:
-    """Blur a video and say so in a line; returns whether all of it is done."""
+    """Blur a video and say so in a line; returns whether all of it is done.
+
+    Its losses and what is assumed of it are a line before the first picture.
+    """
     path = plan.reader.path
+    known = [*plan.notes, *plan.losses]
+    if known:
+        console.say(f"{path}: {'; '.join(known)}")
     try:
         with share_of(tick, len(plan.wanted), f"{path.name}, frame") as tick_share:
             report = run(plan, run_log.logged_video(tick_share, plan.name))
@@ -149,8 +156,8 @@ def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -
         return False
     _log_end(report)
     took = f"{counted(report.frames, 'frame')} in {report.seconds:.1f} s"
-    words = [took if report.is_new else "", *report.left_out, *report.notes]
-    words += _remarks(report, run)
+    words = [took if report.is_new else "", *report.left_out, *_remarks(report, run)]
+    words = [text for text in words if text not in known]
     console.say(f"{path}: {'; '.join(filter(None, words))} -> {report.output}")
     if report.loss:
         console.complain(report.loss)
