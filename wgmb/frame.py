@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -229,6 +229,29 @@ MOST_SIDE = 32768
 _SHORT = ("to_next", "to_prev", "motion", "depth", "camera", "object_id", "normal", "holdout",
           "scale", "prev", "next")  # fmt: skip
 PASSES = tuple(f.name for f in fields(Frame) if f.init and f.name != "color")
+
+
+class PassKeywords(TypedDict, total=False):
+    """The passes of a Frame as keywords: all PASSES but `to_next`."""
+
+    to_prev: Floats | None
+    motion: Floats | None
+    depth: Floats | None
+    window: Window | None
+    camera: Reprojections | None
+    object_id: Integers | None
+    normal: Floats | None
+    holdout: Floats | None
+    scale: Floats | None
+    object_motion: bool
+    prev: Frame | None
+    next: Frame | None
+    number: int
+    wrap: Literal["off", "on"]
+    diffuse_light: Floats | None
+    diffuse_color: Floats | None
+    glossy_light: Floats | None
+    glossy_color: Floats | None
 
 
 def bad_colors(planes: Sequence[np.ndarray]) -> int:

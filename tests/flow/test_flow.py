@@ -24,7 +24,7 @@ from wgmb.flow.pyramid import COARSER, features, level_sizes
 from wgmb.flow.result import result
 from wgmb.flow.search import FullSearch
 from wgmb.flow.shot import EFFORTS, Shot
-from wgmb.flow.sweeps import half_sweep, polish, sweep
+from wgmb.flow.sweeps import SweptLevel, half_sweep, polish, sweep
 from wgmb.flow.views import (
     AROUND,
     BESIDE,
@@ -246,7 +246,8 @@ def test_half_a_sweep_takes_the_best_candidate(views, number, aside, level):
     bound["constants"]["ASIDE_PRICE"] = aside
     output = kit().take((13, 9), STATES)
     most = np.array([[1.01, 0.02, 3], [-0.01, 1.0, -5], [1e-3, 0, 1]])
-    half_sweep(kit(), (13, 9), bound, states_texture(states), [], 0, number, output, most)
+    on = SweptLevel(0, (13, 9), bound, [], most)
+    half_sweep(kit(), on, number, states_texture(states), output)
     got = read(output).astype(float)
     improved = 0
     for y in range(9):
@@ -295,7 +296,8 @@ def test_a_sweep_takes_a_state_that_is_right_and_carried():
     right = np.tile([1.3, -0.6, 0, 0, 0, 0, 0, 0], (9, 13, 1))
     bound = matched(kit(), MIDDLE, small()[0], 0)
     guesses = [states_texture(wrong), states_texture(right)]
-    got = read(sweep(kit(), (13, 9), bound, states_texture(wrong), guesses, 0, 1, np.eye(3)))
+    on = SweptLevel(0, (13, 9), bound, guesses, np.eye(3))
+    got = read(sweep(kit(), on, states_texture(wrong), 1))
     assert np.abs(got[2:-2, 3:-3, :2] - [1.3, -0.6]).max() < 0.3
 
 

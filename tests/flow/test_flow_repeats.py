@@ -24,7 +24,7 @@ from wgmb.flow.match import matched
 from wgmb.flow.passes import STATES
 from wgmb.flow.pyramid import features
 from wgmb.flow.repeats import follow_guide
-from wgmb.flow.sweeps import half_sweep
+from wgmb.flow.sweeps import SweptLevel, half_sweep
 
 SIZE = (13, 9)
 
@@ -128,8 +128,8 @@ def test_half_a_sweep_keeps_near_the_lead(views):
     lead = random_ways((5, 7))
     lead[..., 4] = np.arange(7) % 2
     output, most = kit().take(SIZE, STATES), np.eye(3)
-    args = [], 0, 0, output, most, False, states_texture(lead)
-    half_sweep(kit(), SIZE, compared(views, 0), states_texture(states), *args)
+    on = SweptLevel(0, SIZE, compared(views, 0), [], most, states_texture(lead))
+    half_sweep(kit(), on, 0, states_texture(states), output)
     got, energies = read(output).astype(float), []
 
     def energy(x, y, state):

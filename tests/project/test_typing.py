@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -103,6 +104,61 @@ def crowded(text: str) -> list[str]:
         and len({a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
                 - {"self", "cls"}) > MOST_PARAMETERS
     ]  # fmt: skip
+
+
+NAMES_ARE_DATA = {"bindings", "resources", "values", "changes", "content", "bound"}
+"""Parameters whose names are data: what a shader binds, fields of a value, keys of JSON."""
+HOOKS = {"_", "__"}  # of other packages' classes, which pass what is of no use here
+
+
+def handed_on(text: str) -> list[str]:
+    """Functions that take, as `*args` or `**options`, what they do not know themselves."""
+    return [
+        f"{node.name}: {name.arg}"
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        for name in (node.args.vararg, node.args.kwarg)
+        if name is not None
+        and name.arg not in HOOKS | NAMES_ARE_DATA
+        and (name.annotation is None or ast.unparse(name.annotation) == "Any")
+    ]
+
+
+FOREIGN = {  # the calls of other packages, and what takes a method's own options
+    "__init__: arguments", "__init__: options", "__init__: named", "_alone: arguments",
+    "add_event_handler: options", "decode_bounded: options", "guarded: arguments",
+    "of: more", "view_of: options",
+}  # fmt: skip
+
+
+@pytest.mark.fast
+def test_no_function_hands_on_what_it_does_not_know():
+    assert handed_on("def f(*args): g(*args)") == ["f: args"]
+    assert handed_on("def f(*texts: str, **changes: Any): ...") == []
+    found = {one for file in (ROOT / "wgmb").rglob("*.py") for one in handed_on(file.read_text())}
+    assert found == FOREIGN
+
+
+@pytest.mark.fast
+def test_every_parameter_has_a_type():
+    untyped = [
+        f"{file.relative_to(ROOT)}:{node.lineno} {parameter.arg}"
+        for file in sorted((ROOT / "wgmb").rglob("*.py"))
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        for parameter in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs,
+                          node.args.vararg, node.args.kwarg)
+        if parameter is not None and parameter.annotation is None
+        and parameter.arg not in ("self", "cls", "_", "__")
+    ]  # fmt: skip
+    assert not untyped
+
+
+@pytest.mark.fast
+def test_types_are_checked_by_one_standard_in_all_folders():
+    checker = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pyright"]
+    assert checker["typeCheckingMode"] == "standard"
+    assert "executionEnvironments" not in checker and "wgmb" in checker["include"]
 
 
 @pytest.mark.fast

@@ -10,9 +10,10 @@ import re
 import resource
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -93,7 +94,7 @@ def spoiled(how: str, kind: str, data: bytes, seed: int, number: int) -> bytes:
     return SPOIL[how](data, rng)
 
 
-def judge(kind: str, path: Path, sound: str = "") -> dict:
+def judge(kind: str, path: Path, sound: str = "") -> dict[str, Any]:
     """Read a file: what came of it ("why" where that is wrong), seconds, MiB that it took."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     started = time.process_time()  # a hang ends by the clock, see forked.py
@@ -120,7 +121,9 @@ def _outcome(kind: str, path: Path, sound: str) -> tuple[str, str]:
     return (_SAME if holds == sound else _OTHER), ""
 
 
-def batch(how: str, wanted: list[str], count: int, seed: int, folder: str, kept: str) -> dict:
+def batch(
+    how: str, wanted: list[str], count: int, seed: int, folder: str, kept: str
+) -> dict[str, Any]:
     """In a process of its own: `count` cases of every kind; what came of them, by kind."""
     place = Path(folder)
     (wrote,) = forked([place], lambda at: kinds.write_all(at), seconds=120)
@@ -136,7 +139,9 @@ def batch(how: str, wanted: list[str], count: int, seed: int, folder: str, kept:
         if not isinstance(sound, str):
             raise RuntimeError(f"the sound {path.name} cannot be read")
 
-        def one(number: int, kind=kind, data=data, path=path, sound=sound) -> dict:
+        def one(
+            number: int, kind: str = kind, data: bytes = data, path: Path = path, sound: str = sound
+        ) -> dict[str, Any]:
             bad = spoiled(how, kind, data, seed, number)
             path.write_bytes(bad)
             return judge(kind, path, sound) | {"behind": bad[:_HEADER] == data[:_HEADER]}
@@ -149,7 +154,7 @@ def batch(how: str, wanted: list[str], count: int, seed: int, folder: str, kept:
     return found
 
 
-def _keep(crashers: Path, kind: str, outcome: dict, data: bytes) -> None:
+def _keep(crashers: Path, kind: str, outcome: dict[str, Any], data: bytes) -> None:
     """Put an input beside those that once did what they must not, if it is the first such."""
     what = outcome["why"] if outcome["what"] == "died" else outcome["what"]
     path = crashers / f"{kind}.{what.replace(' ', '-')}{kinds.KINDS[kind].suffix}"
@@ -158,20 +163,20 @@ def _keep(crashers: Path, kind: str, outcome: dict, data: bytes) -> None:
         path.write_bytes(data)
 
 
-def _apart(work, *given, seconds: float):
+def _apart(work: Callable[..., Any], *given: Any, seconds: float):
     ended = apart(work, *given, seconds=seconds, prepare=limits(memory=_ALLOWED))
     if ended.value is None:
         raise RuntimeError(f"exit {ended.code}: {ended.err[-400:]}")
     return ended.value
 
 
-def _tried(how: str, trial: Trial, every: list[str]) -> dict[str, list[dict]]:
+def _tried(how: str, trial: Trial, every: list[str]) -> dict[str, list[dict[str, Any]]]:
     places = str(trial.folder), str(trial.crashers)
     seconds = 60 + trial.count * len(every) / 5
     return _apart(batch, how, every, trial.count, trial.seed, *places, seconds=seconds)
 
 
-def _worst(found: dict[str, list[dict]]) -> str:
+def _worst(found: dict[str, list[dict[str, Any]]]) -> str:
     timed = [(o, kind) for kind, outcomes in found.items() for o in outcomes if "seconds" in o]
     slow, kind = max(timed, key=lambda pair: pair[0]["seconds"])
     large, other = max(timed, key=lambda pair: pair[0]["grown"])
@@ -233,12 +238,12 @@ def exchanges(trial: Trial) -> Iterator[Line]:
     )
 
 
-def replay(paths: list[str]) -> list[dict]:
+def replay(paths: list[str]) -> list[dict[str, Any]]:
     """In a process of its own: what comes of each of these files, in one that may crash."""
     return [forked([p], partial(judge, kinds.kind_of(p)))[0] for p in map(Path, paths)]
 
 
-def replayed(crashers: Path) -> dict[str, dict]:
+def replayed(crashers: Path) -> dict[str, dict[str, Any]]:
     """Results of all files of that folder, by name."""
     paths = sorted(crashers.iterdir())
     found = _apart(replay, [str(path) for path in paths], seconds=600)

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def lost(arguments: list[str]) -> int:
     """In a process of its own: a run whose device is destroyed before the third frame."""
     calls, blur = count(), Blur.__call__
 
-    def blurred(self, *given, **more):
+    def blurred(self: Any, *given: Any, **more: Any):
         if next(calls) == 2:
             self.device.destroy()
         return blur(self, *given, **more)

@@ -13,7 +13,7 @@ from typing import Any
 HUNG, DIED = "hung", "died"
 
 
-def forked(cases: Sequence, case: Callable[[Any], Any], seconds: float = 20) -> list[Any]:
+def forked(cases: Sequence[Any], case: Callable[[Any], Any], seconds: float = 20) -> list[Any]:
     """Results of `case` (returning JSON) for each; {"what": "died" or "hung", "why"} where it did.
 
     The process that calls this must have no threads and no GPU device.
@@ -36,7 +36,7 @@ def forked(cases: Sequence, case: Callable[[Any], Any], seconds: float = 20) -> 
     return found
 
 
-def _go_on(cases: Sequence, case: Callable, writes: int) -> None:
+def _go_on(cases: Sequence[Any], case: Callable[..., Any], writes: int) -> None:
     """In the child: a line for every case, until the last one or the end of the process."""
     code = 1
     try:
@@ -50,7 +50,7 @@ def _go_on(cases: Sequence, case: Callable, writes: int) -> None:
         os._exit(code)
 
 
-def _listen(reads: int, found: list, seconds: float) -> bool:
+def _listen(reads: int, found: list[Any], seconds: float) -> bool:
     """Take lines until the pipe is closed; whether none came for `seconds`."""
     text = b""
     ends = time.monotonic() + seconds

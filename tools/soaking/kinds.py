@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -181,7 +182,7 @@ def _read_ocio(path: Path) -> str:
     return _digest([*linear, config.display(view="Film").shown(color, space)])
 
 
-def _command(path: Path, *words) -> None:
+def _command(path: Path, *words: object) -> None:
     """The command line in this process; what it refuses is an InputError with its words."""
     said = io.StringIO()
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
@@ -254,7 +255,7 @@ def _still(bits: int, channels: int = 4) -> Callable[[Path], object]:
     return write
 
 
-def _pillow(mode: str, **options) -> Callable[[Path], object]:
+def _pillow(mode: str, **options: Any) -> Callable[[Path], object]:
     def write(path: Path) -> None:
         shown = to_display(make.picture(1)[..., :3], 8)
         Image.fromarray(shown).convert(mode).save(path, **options)
@@ -262,7 +263,7 @@ def _pillow(mode: str, **options) -> Callable[[Path], object]:
     return write
 
 
-def _tiff(**options) -> Callable[[Path], object]:
+def _tiff(**options: Any) -> Callable[[Path], object]:
     def write(path: Path) -> None:
         picture = np.ascontiguousarray(make.picture(1)[..., :3])
         tifffile.imwrite(path, picture, photometric="rgb", **options)
@@ -298,7 +299,7 @@ def _camera(path: Path) -> None:
     make.write_cameras(path, range(1, 4), objects=lambda n: {"car": body})
 
 
-def _video(**options) -> Callable[[Path], object]:
+def _video(**options: Any) -> Callable[[Path], object]:
     return lambda path: clips.write(path, **options)
 
 

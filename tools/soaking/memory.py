@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
@@ -93,7 +94,7 @@ def soak_command(trial: Trial) -> Iterator[Line]:
         yield line if code == 0 else Line(line.what, line.tried, "no", f"exit {code}", False)
 
 
-def _watched(arguments: list[str], out) -> tuple[list[list[float]], int]:
+def _watched(arguments: list[str], out: Path) -> tuple[list[list[float]], int]:
     """Memory of a run as its files appear, and its exit code."""
     quiet = subprocess.DEVNULL
     process = subprocess.Popen([*WGMB, *arguments], stdout=quiet, stderr=quiet, env=environment())

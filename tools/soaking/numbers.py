@@ -6,13 +6,14 @@ import hashlib
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from wgmb import METHODS, Blur, Frame
 
 from . import parts
-from .processes import apart
+from .processes import Ended, apart
 from .table import Line, Tally, Trial, row
 
 VALUES = {
@@ -62,7 +63,7 @@ def _bad(made: np.ndarray, size: tuple[int, int]) -> str:
     return f"{nan} NaN, {inf} infinite" if nan or inf else ""
 
 
-def grid(cases: list) -> list[list[str]]:
+def grid(cases: list[Any]) -> list[list[str]]:
     """In a process of its own: what was wrong, (case, what) each; cases are (shape, method,
     things that are put in).
     """
@@ -80,7 +81,7 @@ def grid(cases: list) -> list[list[str]]:
     return wrong
 
 
-def _told(what: str, tried: int, ended, unit: str) -> Line:
+def _told(what: str, tried: int, ended: Ended, unit: str) -> Line:
     if ended.value is None:
         return Line(what, f"{tried:,} {unit}", "no", ended.wrong(0), False)
     tally = Tally(what, unit, tried, [": ".join(one) for one in ended.value])
@@ -100,7 +101,7 @@ def values(trial: Trial) -> Iterator[Line]:
     def one() -> list[str]:
         return [str(rng.choice(list(names))) for names in (INPUTS, VALUES, _PLACES)]
 
-    def several() -> list:
+    def several() -> list[Any]:
         shape, method = (str(rng.choice(list(names))) for names in (_SHAPES, _METHODS))
         return [shape, method, [one() for _ in range(int(rng.integers(2, 6)))]]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -46,14 +47,14 @@ def frame(number: int, size: tuple[int, int] = SIZE, seed: int = 1) -> Frame:
     )
 
 
-def neighbourly(numbers: range, **options) -> list[Frame]:
+def neighbourly(numbers: range, **options: Any) -> list[Frame]:
     """Frames that know their neighbours."""
     each = [frame(n, **options).locked() for n in numbers]
     last = len(each) - 1
     return [one.between(each[max(i - 1, 0)], each[min(i + 1, last)]) for i, one in enumerate(each)]
 
 
-def _image(method: str, **options) -> Callable[[], Step]:
+def _image(method: str, **options: Any) -> Callable[[], Step]:
     def begin() -> Step:
         blur, frames = Blur(method, samples=_MANY, **options), neighbourly(range(4))  # pyright: ignore[reportArgumentType, reportCallIssue]
         return lambda number: blur(frames[number % len(frames)])
@@ -95,7 +96,7 @@ def _perceived() -> Step:
     return step
 
 
-def _viewer(method: str, **state) -> Callable[[], Step]:
+def _viewer(method: str, **state: Any) -> Callable[[], Step]:
     """The viewer without a window, playing a scene; its clock goes on with every frame."""
 
     def begin() -> Step:

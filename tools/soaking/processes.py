@@ -66,7 +66,12 @@ class Ended:
 
 
 def run(
-    line: list, *, seconds: float = 120, env: dict | None = None, prepare=None, cwd=None
+    line: list[Any],
+    *,
+    seconds: float = 120,
+    env: dict[str, Any] | None = None,
+    prepare: Callable[[], object] | None = None,
+    cwd: Path | None = None,
 ) -> Ended:
     """Run a program to its end, or kill it after `seconds`.
 
@@ -128,12 +133,12 @@ def _all_of(stream: IO[bytes]) -> str:
         return stream.read().decode("utf-8", "backslashreplace")
 
 
-def wgmb(*arguments, **options) -> Ended:
+def wgmb(*arguments: object, **options: Any) -> Ended:
     """Run the command line, as `run` does."""
     return run([*WGMB, *arguments], **options)
 
 
-def apart(work: Callable, *given, **options) -> Ended:
+def apart(work: Callable[..., Any], *given: Any, **options: Any) -> Ended:
     """Call a function of a module in a process of its own, as `run` does.
 
     What it is given and what it returns is JSON; the latter is in `value`, None if it did
@@ -151,7 +156,7 @@ def apart(work: Callable, *given, **options) -> Ended:
     return Ended(**{**vars(ended), "out": said, "value": value})
 
 
-def environment(more: dict | None = None) -> dict[str, str]:
+def environment(more: dict[str, Any] | None = None) -> dict[str, str]:
     """This process's environment, in which `wgmb`, these modules and tests' helpers are found."""
     paths = [*PATHS, *filter(None, [os.environ.get("PYTHONPATH")])]
     found = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}

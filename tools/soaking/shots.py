@@ -29,14 +29,14 @@ class Shot:
         """The pattern of the frames."""
         return str(self.folder / "shot.####.exr")
 
-    def arguments(self, out: Path, *more, target: Path | None = None) -> list[str]:
+    def arguments(self, out: Path, *more: str, target: Path | None = None) -> list[str]:
         """`wgmb blur` of the frames into the folder `out`, or to `target`."""
         # By a constant convention, as the frames do not follow each other.
         target = target or out / "o.####.exr"
         words = ["blur", self.pattern, "-o", target, "--method", self.method]
         return [str(word) for word in (*words, "--vectors", "blender", *more)]
 
-    def whole(self, out: Path, *more) -> dict[str, bytes]:
+    def whole(self, out: Path, *more: str) -> dict[str, bytes]:
         """Files that an unbroken run writes into `out`: contents by name."""
         ended = wgmb(*self.arguments(out, *more), seconds=600)
         found = contents(out)

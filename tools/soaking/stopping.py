@@ -6,8 +6,9 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ _DRIVER = b"libvulkan"  # opened with the GPU
 class Running:
     """A `wgmb blur` under way."""
 
-    def __init__(self, shot: Shot, out: Path, *more, target: Path | None = None):
+    def __init__(self, shot: Shot, out: Path, *more: str, target: Path | None = None):
         self.out, self.err = out, tempfile.TemporaryFile()  # noqa: SIM115 - closed with it
         self.process = subprocess.Popen(
             [*WGMB, *shot.arguments(out, *more, target=target)],
@@ -34,7 +35,7 @@ class Running:
             env=environment(),
         )
 
-    def until(self, ready, seconds: float = 60) -> bool:
+    def until(self, ready: Callable[[], object], seconds: float = 60) -> bool:
         """Wait until `ready()`; False if the run ended before, or it took too long."""
         ends = time.monotonic() + seconds
         while not ready():
@@ -122,7 +123,7 @@ def kills(trial: Trial) -> Iterator[Line]:
         yield _kills(method, trial)
 
 
-def _stops(trial: Trial, made: Shot, unbroken: tuple, early: bool) -> Line:
+def _stops(trial: Trial, made: Shot, unbroken: tuple[Any, ...], early: bool) -> Line:
     rng = np.random.default_rng(trial.seed)
     whole, first, rest = unbroken
     when = "in the first second" if early else "while frames are written"

@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 HEAD = "| what | tried | right | worst case |\n|---|---|---|---|"
 _LONGEST = 260  # characters of a cell
@@ -80,7 +81,7 @@ class Trial:
     folder: Path  # its own, empty
     crashers: Path  # inputs that did what none may do are kept here
 
-    def some(self, cases: Iterable) -> list:
+    def some(self, cases: Iterable[Any]) -> list[Any]:
         """At most `count` of the cases, evenly spaced."""
         every = list(cases)
         count = min(self.count, len(every))

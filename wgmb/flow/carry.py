@@ -5,13 +5,13 @@ from __future__ import annotations
 import wgpu
 
 from ..gpu import wgsl
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 
 def carry(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     states: wgpu.GPUTexture,
     along: float,
     turn: float,

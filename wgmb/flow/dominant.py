@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import wgpu
 
 from .homography import TOLERANCE, columns, dominant_homography
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 from .views import AROUND, Views
 
 WHOLE, PARTS = 1.0, 0.5  # how far off the motion of most displacements may be [px]
@@ -18,7 +20,7 @@ ACROSS = 40  # pixels along a side that take part in them
 def follow_most(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     views: Views,
     states: wgpu.GPUTexture,
     centres: np.ndarray,
@@ -59,7 +61,11 @@ def spaced(few: tuple[int, int], many: tuple[int, int]) -> np.ndarray:
 
 
 def _matrices(
-    size, centres, ways, tolerance: float, has_far: bool
+    size: tuple[int, int],
+    centres: np.ndarray,
+    ways: np.ndarray,
+    tolerance: float,
+    has_far: bool,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The homographies of most of the picture to the near frame and the far one.
 
@@ -72,7 +78,9 @@ def _matrices(
     return near, dominant_homography(centres, ways[:, 2:], longest, tolerance / longest)
 
 
-def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> bool:
+def _bends(
+    views: Views, most: tuple[np.ndarray, np.ndarray], centres: np.ndarray, ways: np.ndarray
+) -> bool:
     """True if at least half of the pixels move like most, and so leave constant velocity."""
     agree = np.ones(len(centres), bool)
     for matrix, way in zip(most, (ways[:, :2], ways[:, 2:]), strict=True):
@@ -85,7 +93,11 @@ def _bends(views: Views, most: tuple[np.ndarray, np.ndarray], centres, ways) -> 
 
 
 def settle(
-    passes: FlowPasses, size: tuple[int, int], matched: dict, views: Views, states: wgpu.GPUTexture
+    passes: FlowPasses,
+    size: tuple[int, int],
+    matched: Bindings,
+    views: Views,
+    states: wgpu.GPUTexture,
 ) -> wgpu.GPUTexture:
     """States of a frame, those that the picture hardly tells taken from the motion of most of it.
 
@@ -109,7 +121,7 @@ def settle(
 def settled(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     states: wgpu.GPUTexture,
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
@@ -128,7 +140,11 @@ def _read(passes: FlowPasses, thin: wgpu.GPUTexture) -> np.ndarray:
 
 
 def _run(
-    passes: FlowPasses, entry: str, size, most: tuple[np.ndarray, np.ndarray], **bound
+    passes: FlowPasses,
+    entry: str,
+    size: tuple[int, int],
+    most: tuple[np.ndarray, np.ndarray],
+    **bound: Any,
 ) -> None:
     values = dict(zip(("to_near", "to_far"), map(columns, most), strict=True))
     uniform = passes.uniform("dominant.wgsl", "Dominant", **values)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import wgpu
 
 from .homography import columns, enlarged
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 REACH = 0.2  # of the longer side: how far around the motion of most the coarsest level is searched
 AROUND = 2  # px around the displacements of the coarser level
@@ -18,7 +19,7 @@ FINER_AROUND = 1  # the same on a level finer than the coarsest that is swept
 def guide(
     passes: FlowPasses,
     sizes: list[tuple[int, int]],
-    matched: Sequence[dict],
+    matched: Sequence[Bindings],
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
     """Displacements as the picture seems to move from afar, on the first of some levels.
@@ -39,7 +40,7 @@ def guide(
 def finer(
     passes: FlowPasses,
     sizes: list[tuple[int, int]],
-    matched: Sequence[dict],
+    matched: Sequence[Bindings],
     coarser: wgpu.GPUTexture,
     reach: int = FINER_AROUND,
 ) -> wgpu.GPUTexture:
@@ -54,7 +55,7 @@ def finer(
 def begun(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     most: tuple[np.ndarray, np.ndarray],
 ) -> wgpu.GPUTexture:
     """Displacements of the coarsest level: the best around those of most of the picture."""
@@ -69,7 +70,7 @@ def begun(
 def descended(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     coarser: wgpu.GPUTexture,
     reach: int,
 ) -> wgpu.GPUTexture:
@@ -78,14 +79,21 @@ def descended(
 
 
 def median(
-    passes: FlowPasses, size: tuple[int, int], matched: dict, ways: wgpu.GPUTexture
+    passes: FlowPasses, size: tuple[int, int], matched: Bindings, ways: wgpu.GPUTexture
 ) -> wgpu.GPUTexture:
     """Of the displacements of 3 x 3 pixels, the one nearest to all."""
     return _run(passes, "median", size, matched, ways)
 
 
-def _run(passes, entry, size, matched, ways, **own) -> wgpu.GPUTexture:
+def _run(
+    passes: FlowPasses,
+    entry: str,
+    size: tuple[int, int],
+    matched: Bindings,
+    ways: wgpu.GPUTexture,
+    **values: Any,
+) -> wgpu.GPUTexture:
     output = passes.take(size, STATES)
-    uniform = passes.uniform("guide.wgsl", "Guide", **own)
+    uniform = passes.uniform("guide.wgsl", "Guide", **values)
     passes.run("guide.wgsl", entry, size, guide=uniform, ways=ways, output=output, **matched)
     return output

@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from ..gpu import wgsl
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 WHITE = 245  # of 255: the least of all colours of a light
 LEAST = 3  # px across a light
@@ -103,7 +103,7 @@ def _ways(light: np.ndarray, others: np.ndarray, reach: float) -> Ways:
 def move_lights(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     states: wgpu.GPUTexture,
     lights: np.ndarray,
 ) -> wgpu.GPUTexture:

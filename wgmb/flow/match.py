@@ -5,7 +5,7 @@ from __future__ import annotations
 import wgpu
 
 from ..gpu import wgsl
-from .passes import FlowPasses
+from .passes import Bindings, FlowPasses
 from .views import BESIDE, Views
 
 FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]: finest level, coarser
@@ -15,7 +15,7 @@ FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two fr
 
 def matched(
     passes: FlowPasses, views: Views, features: dict[int, list[wgpu.GPUTexture]], level: int
-) -> dict:
+) -> Bindings:
     """Bindings by their names, and the override `VIEWS`; `features`: levels by frame number."""
     far = views.near if views.far is None else views.far
     view = passes.uniform(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import wgpu
 
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 from .views import Views
 
 
 def mend(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     views: Views,
     states: wgpu.GPUTexture,
     neighbours: dict[int, tuple[Views, wgpu.GPUTexture]],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import wgpu
 
@@ -12,6 +13,7 @@ from ..gpu.textures import ScratchBuffer, TexturePool
 
 _USAGE = wgpu.TextureUsage
 AT_ONCE = 1 << 15  # invocations of a submission without a GPU, where a pass is banded
+Bindings = dict[str, Any]  # resources by the names in a shader, and `constants`
 STATES, FEATURES = ("rgba32float", 2), ("rgba8unorm", 2)  # format, layers
 
 
@@ -27,7 +29,7 @@ class FlowPasses:
         self._in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self.landings, self.costs = (ScratchBuffer(device) for _ in range(2))
-        self._free: dict[tuple, list[wgpu.GPUTexture]] = {}
+        self._free: dict[tuple[tuple[int, int], tuple[str, int]], list[wgpu.GPUTexture]] = {}
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
         self._lent: set[int] = set()  # uids of textures that stay
         self._views: dict[tuple[int, str], wgpu.GPUTextureView] = {}  # of these
@@ -68,7 +70,7 @@ class FlowPasses:
         for first in range(0, whole, most):
             yield first, min(most, whole - first)
 
-    def uniform(self, file: str, struct: str, **values) -> wgpu.GPUBuffer:
+    def uniform(self, file: str, struct: str, **values: Any) -> wgpu.GPUBuffer:
         """The struct of `wgsl/flow/<file>` with these values, the others 0."""
         return gpu.uniform(self.device, f"flow/{file}", struct, **values)
 
@@ -102,7 +104,7 @@ class FlowPasses:
             self._frames[size] = gpu.FrameBindings.of_size(self.device, size)
         return self._frames[size]
 
-    def _bound(self, kernel: gpu.Kernel, name: str, value):
+    def _bound(self, kernel: gpu.Kernel, name: str, value: Any) -> Any:
         if not isinstance(value, wgpu.GPUTexture):
             return value
         array = "_2d_array" in kernel.bindings[name].type if name in kernel.bindings else False

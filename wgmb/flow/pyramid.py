@@ -30,16 +30,27 @@ def all_sizes(size: tuple[int, int]) -> list[tuple[int, int]]:
     return sizes
 
 
-def features(passes: FlowPasses, picture: wgpu.GPUTextureView, size) -> list[wgpu.GPUTexture]:
+def features(
+    passes: FlowPasses, picture: wgpu.GPUTextureView, size: tuple[int, int]
+) -> list[wgpu.GPUTexture]:
     """Features of every level of a linear picture."""
     return list(_levels(passes, picture, size))
 
 
-def _levels(passes: FlowPasses, picture, size) -> Iterator[wgpu.GPUTexture]:
+def _levels(
+    passes: FlowPasses, picture: wgpu.GPUTextureView, size: tuple[int, int]
+) -> Iterator[wgpu.GPUTexture]:
     none = passes.scratch((1, 1), "rgba32float", "none")
     unwritten = passes.take((1, 1), FEATURES)
 
-    def run(entry, size, source, display=none, output=None, written=unwritten):
+    def run(
+        entry: str,
+        size: tuple[int, int],
+        source: wgpu.GPUTexture | wgpu.GPUTextureView,
+        display: wgpu.GPUTexture = none,
+        output: wgpu.GPUTexture | None = None,
+        written: wgpu.GPUTexture = unwritten,
+    ) -> None:
         spare = passes.scratch((1, 1), "rgba32float", "spare")
         passes.run(
             "pyramid.wgsl",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import wgpu
 
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 
 def follow_guide(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     states: wgpu.GPUTexture,
     guide: wgpu.GPUTexture,
     back: list[wgpu.GPUTexture],

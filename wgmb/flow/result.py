@@ -42,8 +42,14 @@ def result(
     spare_depth = passes.scratch((1, 1), "r32float", "spare depth")
     none = passes.scratch((1, 1), "rgba32float", "none")
 
-    def run(entry, size, read=none, read_apart=none, **written: wgpu.GPUTexture):
-        outputs: dict = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
+    def run(
+        entry: str,
+        size: tuple[int, int],
+        read: wgpu.GPUTexture = none,
+        read_apart: wgpu.GPUTexture = none,
+        **written: wgpu.GPUTexture,
+    ) -> None:
+        outputs = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
         outputs |= written
         passes.run(
             "motion.wgsl",
@@ -71,7 +77,7 @@ def result(
 
 
 def _homographies(
-    passes: FlowPasses, thin: wgpu.GPUTexture, size, spacing: int
+    passes: FlowPasses, thin: wgpu.GPUTexture, size: tuple[int, int], spacing: int
 ) -> list[np.ndarray]:
     """The motion of most of the picture to the previous frame and to the next one."""
     some = passes.images.download(passes.device.create_command_encoder(), thin)

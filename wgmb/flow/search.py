@@ -8,7 +8,7 @@ import wgpu
 from ..gpu import wgsl
 from ..gpu.textures import ScratchBuffer
 from .dominant import ACROSS, spaced
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 REACH = 0.2  # of the longer side: the longest displacement along an axis
 
@@ -21,7 +21,7 @@ class FullSearch:
         self._best = ScratchBuffer(passes.device)
 
     def __call__(
-        self, size: tuple[int, int], matched: dict
+        self, size: tuple[int, int], matched: Bindings
     ) -> tuple[wgpu.GPUTexture, np.ndarray, np.ndarray]:
         """States of a frame on its coarsest level; `matched`: the bindings of match.wgsl.
 

@@ -30,13 +30,13 @@ from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
 from .match import matched
 from .mend import mend
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 from .pyramid import all_sizes, features, level_sizes
 from .raising import raised, reduced
 from .repeats import follow_guide
 from .result import Motion, result
 from .search import FullSearch
-from .sweeps import polish, sweep
+from .sweeps import SweptLevel, polish, sweep
 from .views import BESIDE, Views, views_of
 
 Load = Callable[[int], np.ndarray | wgpu.GPUTexture | None]
@@ -177,7 +177,7 @@ class Shot:
     def _views(self, number: int) -> Views | None:
         return views_of(number, lambda other: self._features(other) is not None)
 
-    def _matched(self, views: Views, level: int) -> dict:
+    def _matched(self, views: Views, level: int) -> Bindings:
         """The bindings of match.wgsl for a frame on a level."""
         numbers = {views.here, views.near, views.near if views.far is None else views.far}
         levels = {n: self._features(n) or [] for n in numbers}
@@ -194,7 +194,8 @@ class Shot:
         if level == coarsest:
             states, *some = self._full_search(size, bound)
             states, both = follow_most(passes, size, bound, views, states, *some)
-            states = sweep(passes, size, swept, states, [], level, count, both[0])
+            begun = SweptLevel(level, size, swept, [], both[0])
+            states = sweep(passes, begun, states, count)
             self._results["most", number, level] = both
             states = self._led(views, level, states)
             return self._polished(states, size, bound) if level else states
@@ -208,7 +209,8 @@ class Shot:
         most = enlarged(self._results["most", number, coarsest][0], 2.0 ** (coarsest - level))
         leads = (self._results.get(("lead", number, k)) for k in range(level, coarsest + 1))
         lead = next(one for one in leads if one is not None)
-        states = sweep(passes, size, swept, states, guesses, level, count, most, lead)
+        begun = SweptLevel(level, size, swept, guesses, most, lead)
+        states = sweep(passes, begun, states, count)
         passes.give(*guesses)
         return self._polished(states, size, bound) if level else states
 
@@ -322,7 +324,9 @@ class Shot:
         shown = self._passes.images.download(encoder, finest[0])
         return find_lights(shown, LARGEST * 2**coarsest)
 
-    def _polished(self, states: wgpu.GPUTexture, size, bound: dict) -> wgpu.GPUTexture:
+    def _polished(
+        self, states: wgpu.GPUTexture, size: tuple[int, int], bound: Bindings
+    ) -> wgpu.GPUTexture:
         """The states to parts of a pixel and without noise; the given ones are taken back."""
         passes, here = self._passes, bound["here"]
         stepped = passes.take(size, STATES)

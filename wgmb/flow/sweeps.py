@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import wgpu
 
 from ..gpu import wgsl
 from .homography import columns
-from .passes import STATES, FlowPasses
+from .passes import STATES, Bindings, FlowPasses
 
 NEAR_BY = 0.05  # of the longer side: how far off random pixels are tried
 STEP, FINEST_STEP = 1.0, 2.0  # greatest random change [px], on coarse levels and the finest
@@ -18,28 +20,31 @@ SEEDS = 64  # random numbers that a pass may take for a pixel
 MOST_PASSES = 1000  # on one level
 
 
-def sweep(
-    passes: FlowPasses,
-    size: tuple[int, int],
-    matched: dict,
-    states: wgpu.GPUTexture,
-    carried: list[wgpu.GPUTexture],
-    level: int,
-    count: int,
-    most: np.ndarray,
-    lead: wgpu.GPUTexture | None = None,
-) -> wgpu.GPUTexture:
-    """New states after `count` sweeps; the given ones are taken back.
+@dataclass(frozen=True)
+class SweptLevel:
+    """What stays the same in the sweeps over one level of a frame.
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
-    `most`: the homography of most of the picture to the near frame, on this level; `lead`: what
-    repeats.py made.
+    `most`: the homography of most of the picture to the near frame, on this level; `lead`: the
+    lead of the guide, see repeats.py.
     """
-    after = passes.take(size, STATES)
+
+    number: int
+    size: tuple[int, int]
+    matched: Bindings
+    carried: list[wgpu.GPUTexture]
+    most: np.ndarray
+    lead: wgpu.GPUTexture | None = None
+
+
+def sweep(
+    passes: FlowPasses, level: SweptLevel, states: wgpu.GPUTexture, count: int
+) -> wgpu.GPUTexture:
+    """New states after `count` sweeps; the given ones are taken back."""
+    after = passes.take(level.size, STATES)
     for number in range(PASSES * count):
         is_known = number not in (0, 2)  # the first of a colour finds out what its states cost
-        args = level, number, after, most, is_known, lead
-        half_sweep(passes, size, matched, states, carried, *args)
+        half_sweep(passes, level, number, states, after, is_known)
         states, after = after, states
     passes.give(after)
     return states
@@ -47,66 +52,57 @@ def sweep(
 
 def half_sweep(
     passes: FlowPasses,
-    size: tuple[int, int],
-    matched: dict,
-    states: wgpu.GPUTexture,
-    carried: list[wgpu.GPUTexture],
-    level: int,
+    level: SweptLevel,
     number: int,
+    states: wgpu.GPUTexture,
     output: wgpu.GPUTexture,
-    most: np.ndarray,
     is_known: bool = False,
-    lead: wgpu.GPUTexture | None = None,
 ) -> None:
     """Pass `number` of the sweeps: one colour of the chessboard, propagated or refined.
 
     `is_known`: the costs of this colour's states are in `passes.costs`, from an earlier pass.
     """
     entry = "refine" if number % 2 else "propagate"
-    grid = -(-size[0] // 2), size[1]
-    args = level, number, output, most, is_known, lead
-    _run(passes, entry, size, grid, matched, states, carried, *args)
+    grid = -(-level.size[0] // 2), level.size[1]
+    _run(passes, entry, level, grid, number, states, output, is_known)
 
 
 def polish(
     passes: FlowPasses,
     size: tuple[int, int],
-    matched: dict,
+    matched: Bindings,
     states: wgpu.GPUTexture,
     output: wgpu.GPUTexture,
 ) -> None:
     """Steps of every pixel on the finest level that improve its match."""
-    _run(passes, "polish", size, size, matched, states, [], 0, 0, output, np.eye(3), False)
+    finest = SweptLevel(0, size, matched, [], np.eye(3))
+    _run(passes, "polish", finest, size, 0, states, output, False)
 
 
 def _run(
-    passes,
-    entry,
-    size,
-    grid,
-    matched,
-    states,
-    carried,
-    level,
-    number,
-    output,
-    most,
-    is_known,
-    lead=None,
+    passes: FlowPasses,
+    entry: str,
+    level: SweptLevel,
+    grid: tuple[int, int],
+    number: int,
+    states: wgpu.GPUTexture,
+    output: wgpu.GPUTexture,
+    is_known: bool,
 ) -> None:
     assert 2 * wgsl.load("flow/sweep.wgsl").constant("REFINED") <= SEEDS
+    size, carried, lead = level.size, level.carried, level.lead
     uniform = passes.uniform(
         "sweep.wgsl",
         "Sweep",
         color=number // 2 % 2,
-        seed=SEEDS * (number + MOST_PASSES * level),
+        seed=SEEDS * (number + MOST_PASSES * level.number),
         reach=NEAR_BY * max(size),
-        flow_step=STEP if level else FINEST_STEP,
-        bend_step=BEND_STEP / 2**level,
-        most_apart=MOST_APART if level else FINEST_APART,
+        flow_step=STEP if level.number else FINEST_STEP,
+        bend_step=BEND_STEP / 2**level.number,
+        most_apart=MOST_APART if level.number else FINEST_APART,
         carried=len(carried),
         is_known=is_known,
-        most=columns(most),
+        most=columns(level.most),
         lead_factor=0 if lead is None else round(max(size) / max(lead.size[:2])),
     )
     passes.run(
@@ -121,5 +117,5 @@ def _run(
         costs=passes.costs.at_least(4 * size[0] * size[1]),
         output=output,
         lead=states if lead is None else lead,
-        **matched,
+        **level.matched,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import wgpu
@@ -20,7 +20,7 @@ from ..gpu import wgsl
 from ..gpu.textures import TexturePool
 from ..gpu_frame.views import FrameViews
 from ..methods import METHODS
-from ..methods.keywords import MethodName
+from ..methods.keywords import BlurKeywords, MethodName
 from ..pipeline.blur import Blur
 from ..shutter import Shutter
 
@@ -61,7 +61,7 @@ class MotionBlurPass(EffectPass):
         scene: pygfx.WorldObject | None = None,
         shutter: Shutter | float = 180,
         samples: int | Literal["auto"] | None = None,
-        **options: Any,
+        **options: Unpack[BlurKeywords],
     ):
         super().__init__()
         if method in METHODS and "scene" in METHODS[method].needs:

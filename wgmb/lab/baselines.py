@@ -9,6 +9,7 @@ from functools import cache, partial
 
 import numpy as np
 import wgpu
+from numpy.typing import NDArray
 
 from .. import gpu
 from ..frame import Frame
@@ -82,7 +83,12 @@ def _compiled():
         return None
 
     @njit(parallel=True, fastmath=True)
-    def tap(color, motion, times, out):  # pragma: no cover - compiled
+    def tap(
+        color: NDArray[np.float32],
+        motion: NDArray[np.float32],
+        times: NDArray[np.float32],
+        out: NDArray[np.float32],
+    ):  # pragma: no cover - compiled
         height, width = color.shape[:2]
         zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
         right, bottom = np.float32(width - 1), np.float32(height - 1)

@@ -102,7 +102,14 @@ def _about(seconds: float) -> str:
 class _Matrix:
     """Figures of candidates at growing sizes, each telling what the next will take."""
 
-    def __init__(self, device, candidates, rounds: int, limit: float, tell: Tell):
+    def __init__(
+        self,
+        device: wgpu.GPUDevice,
+        candidates: list[Candidate],
+        rounds: int,
+        limit: float,
+        tell: Tell,
+    ):
         self.device, self.candidates, self.rounds, self.limit = device, candidates, rounds, limit
         self.tell, self.clock = tell, timing.clock(device)
         self.figures: list[BenchFigure] = []
@@ -214,7 +221,7 @@ def copy_bandwidth(device: wgpu.GPUDevice, rounds: int = 7) -> float:
     usage = wgpu.BufferUsage.COPY_SRC | wgpu.BufferUsage.COPY_DST
     a, b = (device.create_buffer(size=_COPY, usage=usage) for _ in range(2))
 
-    def copy(encoder) -> None:
+    def copy(encoder: wgpu.GPUCommandEncoder) -> None:
         encoder.copy_buffer_to_buffer(a, 0, b, 0, _COPY)
 
     seconds = [timing.work(device, copy) for _ in range(rounds + 1)][1:]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..gpu.timing import TimestampClock
@@ -40,7 +41,7 @@ class BenchFigure:
     """The process's largest memory so far [bytes]."""
 
     @property
-    def key(self) -> tuple:
+    def key(self) -> tuple[Any, ...]:
         """Key by which figures of two runs are matched."""
         return self.method, self.width, self.height, self.samples
 

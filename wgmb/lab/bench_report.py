@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from ..gpu.timing import TimestampClock
 from .bench_figures import Bench, BenchFigure
@@ -111,7 +112,7 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
 
 def _bars(figures: Sequence[BenchFigure]) -> list[Bars]:
     """The parts of a call by method, for each size and number of samples."""
-    bars: dict[tuple, Bars] = {}
+    bars: dict[tuple[Any, ...], Bars] = {}
     for f in figures:
         title = f"Time of a frame, {f.width} x {f.height}, {f.samples} samples"
         one = bars.setdefault((f.size, f.samples), Bars(title, "ms", {}))
@@ -156,7 +157,7 @@ def _pass_curves(figures: Sequence[BenchFigure]) -> list[Plot]:
     return [p for p in several if any(len(curve) > 1 for curve in p.curves.values())]
 
 
-def _first(f: BenchFigure) -> list:
+def _first(f: BenchFigure) -> list[Any]:
     return [f.method, f"{f.width} x {f.height}", f.samples]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import wgpu
 
 from ..errors import InputError
 from ..extent import EVERYWHERE
@@ -69,7 +70,7 @@ class Candidate:
         """True if the method renders a scene instead of blurring rendered frames."""
         return "scene" in METHODS[self.method].needs
 
-    def blur(self, samples: int, shutter: Shutter, device) -> Blur:
+    def blur(self, samples: int, shutter: Shutter, device: wgpu.GPUDevice) -> Blur:
         """Compiled for one number of samples."""
         return Blur(
             METHODS[self.method],
@@ -115,7 +116,7 @@ class SceneFrame:
         """The scene through a method."""
         return Render(self.scene, blur, size=self.size, fps=self.fps, antialias=self.antialias)
 
-    def frame(self, device) -> Frame:
+    def frame(self, device: wgpu.GPUDevice) -> Frame:
         """The sharp frame between two on either side, as image methods are given it from files."""
         render = self.render(Blur("tap", device=device))
         made = {k: render.frame(self.time + k / self.fps, k + 1, light=True) for k in range(-2, 3)}
@@ -142,7 +143,12 @@ class Case:
 
 
 def scene_case(
-    name: str, shutter: Shutter, reference: Candidate, scene_frame: SceneFrame, device, tell: Tell
+    name: str,
+    shutter: Shutter,
+    reference: Candidate,
+    scene_frame: SceneFrame,
+    device: wgpu.GPUDevice,
+    tell: Tell,
 ) -> Case:
     """A case whose truth is rendered by `reference`, such as distributed:1024.
 

@@ -82,7 +82,7 @@ class Laboratory:
                 case, jobs, "time", frame_seconds, on_page=True, budget=budget
             )
 
-    def _able(self, report: Report, case: Case, candidates) -> list[Candidate]:
+    def _able(self, report: Report, case: Case, candidates: Iterable[Candidate]) -> list[Candidate]:
         """Those that can make this case; the report says why others cannot."""
         able = []
         for c in candidates:
@@ -127,9 +127,17 @@ class Laboratory:
             for entry, s, f in zip(found, seconds, frames, strict=True)
         ]
 
-    def _fitting(self, case: Case, c: Candidate, known, budget: float, frame_seconds: float) -> int:
+    def _fitting(
+        self,
+        case: Case,
+        c: Candidate,
+        known: Iterable[tuple[int, float]],
+        budget: float,
+        frame_seconds: float,
+    ) -> int:
         """The samples that take about `budget` seconds: guessed, tried, and corrected twice."""
         known, most = list(known), most_samples(METHODS[c.method], self.device)
+        samples = 1
         for _ in range(3):
             samples = _guess(known, budget, most)
             timer = self.timer(case, c.blur(samples, case.shutter, self.device), c)

@@ -1,9 +1,10 @@
 """A paper's findings in words."""
 
 from collections.abc import Callable
+from typing import Any
 
 
-def about(experiment: Callable) -> str:
+def about(experiment: Callable[..., Any]) -> str:
     """The docstring of an experiment, as one paragraph."""
     return " ".join((experiment.__doc__ or "").split())
 

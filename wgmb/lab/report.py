@@ -8,9 +8,10 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -52,7 +53,7 @@ def write(report: Report, path: Path, inputs: Iterable[Path] = ()) -> list[Path]
     return list(written)
 
 
-def as_json(report: Report) -> dict:
+def as_json(report: Report) -> dict[str, Any]:
     """All figures of a report; a number that is not finite is null."""
     return {
         "title": report.title,
@@ -98,13 +99,13 @@ def as_csv(report: Report) -> str:
     return text.getvalue()
 
 
-def _row(e: Entry) -> dict:
+def _row(e: Entry) -> dict[str, Any]:
     own = {"case": e.case, "method": e.label, "kind": e.kind, "samples": e.samples,
            "seconds": e.seconds, "frame_seconds": e.frame_seconds, "budget": e.budget}  # fmt: skip
     return own | {name: _plain(value) for name, value in e.measures.items()}
 
 
-def _plain(value):
+def _plain(value: object):
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -138,7 +139,7 @@ def _head(report: Report) -> str:
     )
 
 
-def _means(report: Report, colors) -> str:
+def _means(report: Report, colors: dict[str, str]) -> str:
     """Every method's mean over the cases, at equal samples."""
     by_label: dict[str, list[Entry]] = {}
     for e in report.entries:
@@ -154,7 +155,7 @@ def _means(report: Report, colors) -> str:
     return f"<h2>All cases</h2><p class=soft>{note}</p>" + _grid(columns, rows, colors, judged=1)
 
 
-def _case(report: Report, index: int, case: Case, colors) -> str:
+def _case(report: Report, index: int, case: Case, colors: dict[str, str]) -> str:
     truth = Entry(case.name, "truth", "truth", {}, picture=case.truth)
     still = [e for e in report.of(case.name, on_page=True) if e.kind != "time"]
     timed = report.of(case.name, kind="time")
@@ -237,7 +238,7 @@ def _uri(values: np.ndarray) -> str:
     return "data:image/webp;base64," + base64.b64encode(data.getvalue()).decode()
 
 
-def _figures(entries: list[Entry], colors) -> str:
+def _figures(entries: list[Entry], colors: dict[str, str]) -> str:
     framed = any(e.frame_seconds for e in entries)
     columns = ["method", "samples", "time [ms]", *["without frame [ms]"][: int(framed)]]
     columns += [m.title for m in METRICS.values()]
@@ -251,12 +252,18 @@ def _figures(entries: list[Entry], colors) -> str:
     return _grid(columns, rows, colors, judged=3 + framed, floor=floor)
 
 
-def _table(table: Table, colors) -> str:
+def _table(table: Table, colors: dict[str, str]) -> str:
     note = f"<p class=soft>{escape(table.note)}</p>" if table.note else ""
     return f"<h3>{escape(table.title)}</h3>{note}{_grid(table.columns, table.rows, colors)}"
 
 
-def _grid(columns, rows, colors, judged: int | None = None, floor=None) -> str:
+def _grid(
+    columns: Sequence[object],
+    rows: Sequence[Sequence[Any]],
+    colors: dict[str, str],
+    judged: int | None = None,
+    floor: Sequence[Any] | None = None,
+) -> str:
     """A sortable table; from column `judged` on stand the METRICS, the best of each marked.
 
     The row `floor` takes no part in that.
@@ -297,7 +304,7 @@ def _digits(values: Iterable[object]) -> int:
     return max((len(n.partition(".")[2]) for n in numbers), default=0)
 
 
-def _text(value, digits: int) -> str:
+def _text(value: object, digits: int) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
@@ -345,7 +352,7 @@ def _curves(entries: list[Entry], floor: dict[str, float]) -> list[Plot]:
     return plots
 
 
-def _plots(plots: Iterable[Plot], colors, bars: Iterable[Bars] = ()) -> str:
+def _plots(plots: Iterable[Plot], colors: dict[str, str], bars: Iterable[Bars] = ()) -> str:
     drawn = "".join(map(_bars, bars)) + "".join(_plot(p, colors) for p in plots)
     return f'<div class="plots">{drawn}</div>' if drawn else ""
 

@@ -87,7 +87,7 @@ class Report:
     bars: list[Bars] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def of(self, case: str, **wanted) -> list[Entry]:
+    def of(self, case: str, **wanted: object) -> list[Entry]:
         """The entries of a case whose fields are as `wanted`."""
         return [
             e

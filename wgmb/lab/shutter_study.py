@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -46,7 +47,9 @@ def difference(shutter: Shutter, speed: float, fps: float, cone: Cone | None = N
     return total / 4
 
 
-def _exposed(shutter: Shutter, theta, half, speed: float) -> np.ndarray:
+def _exposed(
+    shutter: Shutter, theta: np.ndarray, half: np.ndarray | float, speed: float
+) -> np.ndarray:
     """Share of the exposure that a disk, at angle 0 at the frame's instant, is at a place."""
     if shutter.degrees == 0:
         return (np.abs(theta) < half).astype(float)
@@ -78,7 +81,9 @@ def best_shutter(speed: float, fps: float, cone: Cone | None = None) -> tuple[st
     return name, found[name][0]
 
 
-def perception_charts(differences, speeds: np.ndarray, fps: float) -> tuple[Chart, Chart]:
+def perception_charts(
+    differences: Mapping[str, Sequence[float]], speeds: np.ndarray, fps: float
+) -> tuple[Chart, Chart]:
     """Differences by shutter (`perceive.compare`) against speed [rad/s], and the small ones."""
     lines = {name: (speeds, np.asarray(values)) for name, values in differences.items()}
     title = f"perceived video and perceived nature, {fps:g} frames per second"

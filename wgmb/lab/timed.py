@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from dataclasses import replace
+from typing import Any
 
 import wgpu
 
@@ -30,7 +31,7 @@ class Timed:
         self.output = self.images.texture("output", size, blur.output)
         self.memory, self.runs, self.counts = 0, [], {}
 
-    def draw(self, encoder, clock: timing.Clock | None) -> None:
+    def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None) -> None:
         """One frame, as the method draws it."""
         raise NotImplementedError
 
@@ -58,7 +59,7 @@ class TimedScene(Timed):
                 return
         raise InputError(f"method {blur.method.name!r} cannot draw any of the benchmark scenes")
 
-    def draw(self, encoder, clock):
+    def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None):
         """One frame of the scene."""
         self._render.draw(self.output.create_view(), 0.0, timing=clock)
 
@@ -79,7 +80,7 @@ class TimedFrame(Timed):
         self.calls: list[tuple[float, float, float]] = []
         self.work()
 
-    def draw(self, encoder, clock):
+    def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None):
         """One frame, from its textures."""
         output = self.output.create_view()
         self.blur.encode(encoder, output=output, timing=clock, **self.views)
@@ -109,7 +110,7 @@ def _held() -> int:
     return counts.get_dict()["total"]["resource_mem"]
 
 
-def _bytes(views: dict, output: wgpu.GPUTexture) -> int:
+def _bytes(views: dict[str, Any], output: wgpu.GPUTexture) -> int:
     """Return the size of the textures of `encode`'s inputs and the output [bytes]."""
     every = [v for one in views.values() if isinstance(one, FrameViews) for v in vars(one).values()]
     read = [v.texture for v in every if isinstance(v, wgpu.GPUTextureView)]

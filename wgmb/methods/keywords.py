@@ -30,3 +30,10 @@ class MethodKeywords(TypedDict, total=False):
     depth_test: bool
     splat: Literal["point", "line"]
     seed: int
+
+
+class BlurKeywords(MethodKeywords, total=False):
+    """Options of a Blur that all methods take, beside those of each."""
+
+    jitter: float
+    max_blur: float | None

@@ -115,6 +115,8 @@ class Output:
         for path in is_output:
             atomic.sweep(path, is_output[path])
         if is_video:
+            from ..video.write import frames
+
             for view in self._views:
                 path = in_view(self.pattern, view)
                 temporary = atomic.temporary_name(path)

@@ -17,7 +17,7 @@ from .. import gpu
 from ..camera import Window
 from ..errors import InputError
 from ..extent import Extent
-from ..frame import Floats, Frame
+from ..frame import Floats, Frame, PassKeywords
 from ..gpu.textures import TexturePool, copy_middle
 from ..gpu.timing import Clock
 from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
@@ -276,7 +276,7 @@ class Blur:
             self._judge.encode(encoder, inputs, confidence)
 
     def __call__(
-        self, color: Floats | Frame, to_next: Floats | None = None, **passes: Any
+        self, color: Floats | Frame, to_next: Floats | None = None, **passes: Unpack[PassKeywords]
     ) -> NDArray[np.float32]:
         """Blur one frame: a Frame, or a colour array and its passes (see Frame).
 

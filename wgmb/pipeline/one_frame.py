@@ -8,40 +8,19 @@ import numpy as np
 import wgpu
 from numpy.typing import NDArray
 
-from ..camera import Reprojections, Window
-from ..frame import PASSES, Floats, Frame, Integers
+from ..frame import PASSES, Floats, Frame, PassKeywords
 from ..methods import default_method
 from ..methods.contract import Method
-from ..methods.keywords import Curve, MethodKeywords, MethodName
+from ..methods.keywords import BlurKeywords, Curve, MethodName
 from ..shutter import Shutter, Weight
 from .blur import Blur
 
 
-class FrameKeywords(MethodKeywords, total=False):
+class FrameKeywords(PassKeywords, BlurKeywords, total=False):
     """Keywords of `blur`: the passes of a Frame, and the options of a Blur."""
 
-    jitter: float
-    max_blur: float | None
     device: wgpu.GPUDevice | str | None
     output: Literal["rgba32float", "rgba16float"]
-    to_prev: Floats | None
-    motion: Floats | None
-    depth: Floats | None
-    window: Window | None
-    camera: Reprojections | None
-    object_id: Integers | None
-    normal: Floats | None
-    holdout: Floats | None
-    scale: Floats | None
-    object_motion: bool
-    prev: Frame | None
-    next: Frame | None
-    number: int
-    wrap: Literal["off", "on"]
-    diffuse_light: Floats | None
-    diffuse_color: Floats | None
-    glossy_light: Floats | None
-    glossy_color: Floats | None
 
 
 def blur(

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, islice
-from typing import Any, Protocol
+from typing import Protocol, TypedDict, Unpack
 
 import numpy as np
 import wgpu
@@ -32,6 +32,17 @@ from .read.reader import VideoReader
 from .thumbnail import Thumbnail, change, is_cut
 
 _BEFORE = 14  # pictures decoded before the first exposure, which its motion may depend on
+
+
+class ExposureKeywords(TypedDict, total=False):
+    """Keywords of `Exposures` that those of a video take, too."""
+
+    holdout: Holdout | None
+    at_edges: Blur | None
+    fill: bool
+    cuts: bool
+    known_cuts: Collection[int]
+    planes: Planes | None
 
 
 class Exposures:
@@ -211,11 +222,11 @@ class VideoBlur(Exposures):
         *,
         clock: Clock = Clock(),  # noqa: B008  it is frozen
         has_own_times: bool = False,
-        **more: Any,
+        **more: Unpack[ExposureKeywords],
     ):
         pace = float(clock.speed)
-        more |= {"flash": FLASH / pace, "tolerance": reader.tolerance / pace}
-        super().__init__(blur, motion, **more)
+        tolerance = reader.tolerance / pace
+        super().__init__(blur, motion, flash=FLASH / pace, tolerance=tolerance, **more)
         self._planes.expansion.check_video(reader.path, reader.coding)
         self.reader, self.clock = reader, clock
         self._times = reader.times if has_own_times else reader.exact_times

@@ -9,6 +9,7 @@ from pathlib import Path
 import glfw
 import numpy as np
 from imgui_bundle import imgui
+from rendercanvas import BaseRenderCanvas
 
 from .. import interpreter
 from ..color.srgb import linear
@@ -30,7 +31,7 @@ class Actions:
 
     def __init__(
         self,
-        canvas,
+        canvas: BaseRenderCanvas,
         stage: Renderer | DrawThread,
         screen: Screen | ScreenThread,
         say: Callable[[str], None],
@@ -40,7 +41,7 @@ class Actions:
         self._stage, self._screen, self._say, self._quit = stage, screen, say, quit
         self._video: FrameVideo | None = None
         self._windowed: tuple[int, int, int, int] | None = None
-        self.export: tuple[subprocess.Popen, str] | None = None
+        self.export: tuple[subprocess.Popen[bytes], str] | None = None
         self.export_message = ""
 
     @property
@@ -166,7 +167,7 @@ class Actions:
             glfw.set_window_monitor(window, monitor, 0, 0, *mode.size, mode.refresh_rate)
 
 
-def _end(child: subprocess.Popen) -> None:
+def _end(child: subprocess.Popen[bytes]) -> None:
     """Have an export leave nothing behind, and end."""
     child.terminate()
     child.wait()

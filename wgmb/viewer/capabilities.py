@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -32,8 +33,10 @@ class Choices:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self.displayed = device, DisplayCache(device)
         self._scene: SceneSubject | None = None
-        self._clips: dict[tuple, ClipSubject | VideoSubject] = {}
-        self._coming: tuple[tuple, ClipSubject] | None = None  # seen, but its vectors unknown
+        self._clips: dict[tuple[Any, ...], ClipSubject | VideoSubject] = {}
+        self._coming: tuple[tuple[Any, ...], ClipSubject] | None = (
+            None  # seen, but its vectors unknown
+        )
 
     def subject(self, state: State) -> Subject:
         """The scene or the frames that the state is about."""
@@ -75,7 +78,7 @@ class Choices:
         _ = clip.finding  # what cannot be read is not opened
         return clip
 
-    def _close_but(self, keys: Collection[tuple]) -> None:
+    def _close_but(self, keys: Collection[tuple[Any, ...]]) -> None:
         for key in [key for key in self._clips if key not in keys]:
             clip = self._clips.pop(key)
             if isinstance(clip, VideoSubject):
@@ -164,13 +167,13 @@ class Choices:
         return state
 
 
-def _key(state: State) -> tuple:
+def _key(state: State) -> tuple[Any, ...]:
     """Settings with which files are opened."""
     masks = state.blur.holdout, state.blur.scale
     return state.source, state.input, masks, state.read_as, _motion_of(state)
 
 
-def _motion_of(state: State) -> tuple:
+def _motion_of(state: State) -> tuple[Any, ...]:
     """Settings on which a video's motion depends; none for other files."""
     if not state.is_video:
         return ()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from ..scene import builtin
@@ -71,7 +72,7 @@ class WindowLayout:
 
 
 def grip(
-    state: State, layout: WindowLayout, x: float, y: float, button: int, modifiers
+    state: State, layout: WindowLayout, x: float, y: float, button: int, modifiers: Collection[str]
 ) -> str | None:
     """Return the drag that a press at x, y starts: "wipe", "orbit", "pan", or None."""
     if not is_inside(layout.area, x, y):

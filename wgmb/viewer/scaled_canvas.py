@@ -41,10 +41,12 @@ class ScaledCanvas:
         for context in self._contexts:
             context.release()
 
-    def add_event_handler(self, handler: Callable[[dict], None], *types: str, **options) -> None:
+    def add_event_handler(
+        self, handler: Callable[[dict[str, Any]], None], *types: str, **options: Any
+    ) -> None:
         """As of the canvas; `handler` gets positions in pixels of the interface."""
 
-        def scaled(event: dict) -> None:
+        def scaled(event: dict[str, Any]) -> None:
             own = dict(event)
             for name in ("x", "y", "width", "height"):
                 if name in own:

@@ -9,12 +9,13 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import glfw
 import numpy as np
 import wgpu
 from imgui_bundle import imgui
+from rendercanvas import BaseRenderCanvas
 from rendercanvas.offscreen import OffscreenRenderCanvas
 from wgpu.utils.imgui import ImguiRenderer
 
@@ -55,6 +56,16 @@ _HANDLED = ("pointer_down", "pointer_up", "pointer_move", "wheel", "key_down", "
 _SEEN = (*_HANDLED, "pointer_enter", "pointer_leave", "char", "resize")
 
 
+class ViewerKeywords(TypedDict, total=False):
+    """Keywords of a Viewer, all that are of use without a window."""
+
+    device: wgpu.GPUDevice | None
+    drawing_device: wgpu.GPUDevice | None
+    threaded: bool
+    interface: float
+    clock: Callable[[], float]
+
+
 class Viewer:
     """The viewer on a canvas: state, event handling and drawing.
 
@@ -67,7 +78,7 @@ class Viewer:
 
     def __init__(
         self,
-        canvas,
+        canvas: BaseRenderCanvas,
         state: State,
         *,
         device: wgpu.GPUDevice | None = None,
@@ -132,10 +143,10 @@ class Viewer:
 
     # ---- events --------------------------------------------------------------------------
 
-    def _guarded(self, function):
+    def _guarded(self, function: Callable[..., None]):
         """Errors end the viewer; left alone, rendercanvas logs them and goes on."""
 
-        def guarded(*arguments):
+        def guarded(*arguments: Any):
             if self.failed is not None:
                 return
             try:
@@ -174,11 +185,11 @@ class Viewer:
         self.canvas.scale = min(max(self.canvas.scale * factor, low), high)
         self.say(f"interface {self.canvas.scale:.0%}")
 
-    def _on_any(self, event: dict) -> None:
+    def _on_any(self, event: dict[str, Any]) -> None:
         self._due = _AFTER_EVENT
         self.canvas.request_draw()
 
-    def _on_event(self, event: dict) -> None:
+    def _on_event(self, event: dict[str, Any]) -> None:
         kind = event["event_type"]
         if "x" in event:
             self._mouse = event["x"], event["y"]
@@ -193,7 +204,7 @@ class Viewer:
         else:
             self._on_pointer(kind, event)
 
-    def _on_pointer(self, kind: str, event: dict) -> None:
+    def _on_pointer(self, kind: str, event: dict[str, Any]) -> None:
         x, y, layout = event["x"], event["y"], self._layout()
         free = not (self._imgui.backend.io.want_capture_mouse and self._over_popup())
         if kind == "pointer_down":
@@ -444,7 +455,10 @@ class Viewer:
 
 
 def offscreen(
-    state: State, size: tuple[int, int] = (1280, 720), ratio: float = 1.0, **options
+    state: State,
+    size: tuple[int, int] = (1280, 720),
+    ratio: float = 1.0,
+    **options: Unpack[ViewerKeywords],
 ) -> Viewer:
     """A Viewer without a window: `canvas.submit_event` in, `frame` out."""
     canvas = OffscreenRenderCanvas(size=size, pixel_ratio=ratio)

@@ -23,7 +23,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..processes import apart
 from ..table import Line, Tally, Trial, row
@@ -36,7 +36,7 @@ _TICK = os.sysconf("SC_CLK_TCK")
 _SKIPPED = ("wgmb.viewer", "wgmb.hosts", "wgmb.lab", "wgmb.__main__")
 
 Mutations = Callable[[bytes], Iterator[tuple[str, bytes]]]
-Commands = Callable[[Path, Path], list[list]]
+Commands = Callable[[Path, Path], list[list[Any]]]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def too_large(
 
 
 def measure(
-    words: list,
+    words: list[Any],
     output: Path | None = None,
     digest: Callable[[Path], str] | None = None,
     *,
@@ -127,7 +127,13 @@ def measure(
         )
 
 
-def _command(words: list, output: Path | None, digest, said: int, told: int) -> None:
+def _command(
+    words: list[Any],
+    output: Path | None,
+    digest: Callable[[Path], str] | None,
+    said: int,
+    told: int,
+) -> None:
     """In the child: the command, then the digest of its output; does not return."""
     code = 70
     try:
@@ -221,7 +227,7 @@ def prepare() -> None:
             importlib.import_module(name)
 
 
-def tried(names: list[str], count: int, folder: str) -> dict[str, dict]:
+def tried(names: list[str], count: int, folder: str) -> dict[str, dict[str, Any]]:
     """In a process of its own: at most `count` changed files of each kind, evenly spaced.
 
     By kind: "files", "seconds", "mb" (the worst), "wrong" (a text for each fault).
@@ -231,7 +237,7 @@ def tried(names: list[str], count: int, folder: str) -> dict[str, dict]:
     return {name: _tried(name, kinds[name], count, Path(folder) / name) for name in names}
 
 
-def _tried(name: str, kind: StatedKind, count: int, folder: Path) -> dict:
+def _tried(name: str, kind: StatedKind, count: int, folder: Path) -> dict[str, Any]:
     folder.mkdir()
     path, output = folder / f"{name}{kind.suffix}", folder / f"out{kind.suffix}"
     _written(kind.write, path)
@@ -279,7 +285,7 @@ def _written(write: Callable[[Path], object], path: Path) -> None:
         raise RuntimeError(f"{path.name} could not be written")
 
 
-def _of_sound(words: list, output: Path, kind: StatedKind) -> str:
+def _of_sound(words: list[Any], output: Path, kind: StatedKind) -> str:
     """The digest of what a command makes of the sound file; RuntimeError if it fails."""
     _clear(output)
     measured = measure(words, output, kind.digest)

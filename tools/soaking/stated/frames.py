@@ -6,6 +6,7 @@ import hashlib
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -71,7 +72,7 @@ def _header(data: bytes, at: int) -> tuple[list[Place], int]:
     return places, at + 1
 
 
-def _commands(path: Path, output: Path) -> list[list]:
+def _commands(path: Path, output: Path) -> list[list[Any]]:
     return [["info", path], ["blur", path, "-o", output, "--method", "tap", "--overwrite", "-q"]]
 
 
@@ -83,7 +84,7 @@ def _pixels(path: Path) -> str:
     return hashed.hexdigest()
 
 
-def _flat(path: Path, **header) -> None:
+def _flat(path: Path, **header: Any) -> None:
     make.write_exr(path, make.frame(2), {"multiView": ["left"], "note": "x" * 40}, **header)
 
 
@@ -117,7 +118,7 @@ def _sampled(path: Path) -> None:
 
 def _deep(kind: object) -> Callable[[Path], object]:
     def write(path: Path) -> None:
-        header: dict = {"type": kind, "compression": OpenEXR.ZIPS_COMPRESSION}
+        header: dict[str, Any] = {"type": kind, "compression": OpenEXR.ZIPS_COMPRESSION}
         if kind == OpenEXR.deeptile:
             header["tiles"] = OpenEXR.TileDescription()
             header["tiles"].xSize = header["tiles"].ySize = 16

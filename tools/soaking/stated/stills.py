@@ -7,6 +7,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import tifffile
 from PIL import Image
@@ -20,7 +21,7 @@ from . import StatedKind, too_large
 _PLAIN = "--method", "tap", "--overwrite", "-q"
 
 
-def _of_stills(path: Path, output: Path) -> list[list]:
+def _of_stills(path: Path, output: Path) -> list[list[Any]]:
     """Commands on a still: alone, and as frame 2 of three, whose motion is found."""
     for number in (1, 3):
         _still(path.with_name(f"{path.stem}.{number:04}{path.suffix}"), number)
@@ -39,7 +40,7 @@ def _progressive(path: Path) -> None:
     Image.fromarray(to_display(make.picture(2)[..., :3], 8)).save(path, progressive=True)
 
 
-def _tiff(**options) -> Callable[[Path], object]:
+def _tiff(**options: Any) -> Callable[[Path], object]:
     return lambda path: tifffile.imwrite(
         path, to_display(make.picture(2)[..., :3], 8), photometric="rgb", **options
     )

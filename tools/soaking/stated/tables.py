@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import make_frames as make
 from make_config import film_config
@@ -48,7 +49,7 @@ def sizes(data: bytes) -> Iterator[tuple[str, bytes]]:
             yield f"{found[0].decode()} at {found.start()} {value}", changed
 
 
-def _commands(path: Path, output: Path) -> list[list]:
+def _commands(path: Path, output: Path) -> list[list[Any]]:
     """Show a frame with a config that names the table."""
     frame, config = path.with_name("frame.exr"), path.with_name("config.ocio")
     make.write_exr(frame, make.frame(2))

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import make_clips as clips
 from wgmb.video.read.reader import VideoReader
@@ -201,7 +202,7 @@ def riff(data: bytes) -> Iterator[tuple[str, bytes]]:
 # ---- kinds ------------------------------------------------------------------------------------
 
 
-def _commands(path: Path, output: Path) -> list[list]:
+def _commands(path: Path, output: Path) -> list[list[Any]]:
     made = output.with_suffix(".mkv")  # not every kind is also written
     return [["info", path], ["blur", path, "-o", made, "--flow", "none", "--overwrite", "-q"]]
 
@@ -210,7 +211,7 @@ def _pictures(path: Path) -> str:
     return hashlib.sha256(repr(list(VideoReader(path).times)).encode()).hexdigest()
 
 
-def _video(codec: str, pixels: str = "yuv420p", **more) -> Callable[[Path], object]:
+def _video(codec: str, pixels: str = "yuv420p", **more: Any) -> Callable[[Path], object]:
     def write(path: Path) -> object:
         made = [clips.frame(clips.planes(n, _SIZE), "yuv420p") for n in range(6)]
         made = [one.reformat(format=pixels) for one in made]

@@ -50,7 +50,7 @@ class DenseStages:
             for longest in (SMALL, MIDDLE)
         )
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
-        self._turns: dict[tuple, wgpu.GPUBuffer] = {}
+        self._turns: dict[tuple[int, int, int], wgpu.GPUBuffer] = {}
         self._tables = self._buffer("tables", 4 * _constant("summary", "TABLES", "BINS"))
         self._list, self._groups_of_blocks, self._summary = (
             self._buffer(struct, wgsl.load(f"{FOLDER}/unfit.wgsl").dtype(struct).itemsize)
@@ -173,7 +173,14 @@ class DenseStages:
         )  # fmt: skip
         return self._refined(encoder, turn, self._middle, raised, 1)
 
-    def _refined(self, encoder, turn, level: int, state, further: int = 0) -> wgpu.GPUTextureView:
+    def _refined(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        turn: wgpu.GPUBuffer,
+        level: int,
+        state: wgpu.GPUTextureView,
+        further: int = 0,
+    ) -> wgpu.GPUTextureView:
         """Medians and steps of inverse search."""
         size = self.sizes[level]
         output = self.images.view(f"refined {further}", size, STATE)
@@ -185,7 +192,14 @@ class DenseStages:
         )  # fmt: skip
         return output
 
-    def _choose(self, encoder, turn, dense, state, output: wgpu.GPUTextureView) -> None:
+    def _choose(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        turn: wgpu.GPUBuffer,
+        dense: wgpu.GPUTextureView,
+        state: wgpu.GPUTextureView,
+        output: wgpu.GPUTextureView,
+    ) -> None:
         """The motion that costs less, in the whole picture."""
         images, size, levels = self.images, self.sizes[self._middle], self._level(self._middle)
         costs, along, chosen = (images.view(n, size, STATE) for n in ("costs", "along", "chosen"))
@@ -201,7 +215,16 @@ class DenseStages:
             state=state, chosen=chosen, motion=dense, output=output,
         )  # fmt: skip
 
-    def _run(self, encoder, file: str, entry: str, size, groups=None, /, **bound: Any) -> None:
+    def _run(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        file: str,
+        entry: str,
+        size: tuple[int, int],
+        groups: tuple[int, int] | None = None,
+        /,
+        **bound: Any,
+    ) -> None:
         """Record a pass over a picture of `size`, of so many `groups` if not one for each pixel."""
         kernel, frame = gpu.kernel(self.device, f"{FOLDER}/{file}.wgsl"), self._frame(size)
         if groups:

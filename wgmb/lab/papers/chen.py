@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...errors import InputError
@@ -67,7 +69,7 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
         )
     )
     report.tables.append(_by_pass(lab, passes, tap.label))
-    quality: list[list] = []
+    quality: list[list[Any]] = []
     for name in ("scaling", "crossing"):
         scene_frame = SceneFrame(builtin.make(name), size=size)
         reference = Candidate("distributed", (("seed", 1),), 256)
@@ -94,7 +96,7 @@ def _by_pass(
     whole: dict[str, float] = {}
     for (method, _), s in median.items():
         whole[method] = whole.get(method, 0.0) + s
-    rows: list[list] = []
+    rows: list[list[Any]] = []
     for method, total in whole.items():
         parts = [(label, passes[method, label][0][0], s)
                  for (m, label), s in median.items() if m == method]  # fmt: skip
@@ -164,7 +166,7 @@ def _facing(lab: Laboratory, report: Report, case: Case) -> None:
 def _gone(picture: np.ndarray, case: Case) -> float:
     """The share of the sharp frame's gradients that a picture has lost."""
 
-    def slopes(p) -> float:
+    def slopes(p: np.ndarray) -> float:
         shown = display(p)
         return float(sum(np.abs(np.diff(shown, axis=axis)).sum() for axis in (0, 1)))
 

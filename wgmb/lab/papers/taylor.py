@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _budgets(report: Report, case: Case) -> list[float]:
 
 def _claims(
     report: Report, case: Case, metric: str, labels: list[str]
-) -> tuple[list[str], list[list]]:
+) -> tuple[list[str], list[list[Any]]]:
     """Return the paper's findings as reproduced here, and the numbers behind them."""
     traced, blended, published, *_ = labels
     small, large = _budgets(report, case)
@@ -108,7 +109,7 @@ def _error(metric: str, value: float) -> float:
     return 10 ** (-value / 20) if metric.startswith("psnr") else value
 
 
-def _equal_error(report: Report, case: Case, metric: str) -> list[list]:
+def _equal_error(report: Report, case: Case, metric: str) -> list[list[Any]]:
     traced = report.of(case.name, kind="samples", label="distributed")
     rays, times, errors = np.array(
         [(e.samples or 0, e.seconds or 0.0, _error(metric, e.measures[metric])) for e in traced]

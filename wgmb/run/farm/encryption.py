@@ -11,20 +11,23 @@ from __future__ import annotations
 import ssl
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from distributed.security import Security
 
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
 
 class _Socket(ssl.SSLSocket):
-    def do_handshake(self, *arguments: Any) -> None:
-        return _alone(super().do_handshake, *arguments)
+    def do_handshake(self, block: bool = False) -> None:
+        return _alone(super().do_handshake, block)
 
-    def send(self, *arguments: Any) -> int:
-        return _alone(super().send, *arguments)
+    def send(self, data: Buffer, flags: int = 0) -> int:
+        return _alone(super().send, data, flags)
 
-    def recv_into(self, *arguments: Any) -> int:
-        return _alone(super().recv_into, *arguments)
+    def recv_into(self, buffer: Buffer, nbytes: int | None = None, flags: int = 0) -> int:
+        return _alone(super().recv_into, buffer, nbytes, flags)
 
 
 class Encryption(Security):

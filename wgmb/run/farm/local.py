@@ -79,7 +79,7 @@ def local_client(count: int) -> Iterator[Any]:
             _load_once()
         cluster = cluster_of(
             Encryption.temporary(),
-            env=dict(os.environ),  # that of the first process that loaded modules may be older
+            dict(os.environ),  # that of the first process that loaded modules may be older
         )
         with (
             closing(cluster),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from distributed import Nanny, Scheduler, SpecCluster, Worker
+from distributed.security import Security
 
 _HOST: dict[str, Any] = {"host": "tls://127.0.0.1", "protocol": "tls://"}
 _SILENT: dict[str, Any] = {"silence_logs": 50}
@@ -31,13 +32,13 @@ class LocalNanny(Nanny):
         super().__init__(*arguments, worker_class=LocalWorker, **named)
 
 
-def cluster_of(security: Any, **worker: Any) -> SpecCluster:
+def cluster_of(security: Security, env: dict[str, str]) -> SpecCluster:
     """A scheduler in this process, which can be scaled: workers of one thread in own processes.
 
-    `worker`: further options of Nanny.
+    `env`: their environment.
     """
     common = {**_HOST, "security": security}
-    options = {**common, "nthreads": 1, "memory_limit": 0, **_SILENT, **worker}
+    options = {**common, "nthreads": 1, "memory_limit": 0, **_SILENT, "env": env}
     spec = {"cls": LocalNanny, "options": options}
     return SpecCluster(
         scheduler={"cls": LocalScheduler, "options": {**common, "port": 0, "dashboard": False}},

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...camera import MAX_INDEX, Camera, Reprojections
+from ...camera import MAX_INDEX, Camera, Reprojections, Window
 from ...errors import InputError
 from ...files import bounded
 
@@ -33,8 +33,15 @@ class CameraFile:
         """Numbers of the frames in the file."""
         return sorted(self._frames)
 
-    def around(self, number: int, **options: Any) -> Reprojections:
-        """The reprojections from frame `number` to its neighbours; `options` as for Reprojections.
+    def around(
+        self,
+        number: int,
+        *,
+        depth_kind: str = "planar",
+        far: float = 1e9,
+        window: Window | None = None,
+    ) -> Reprojections:
+        """The reprojections from frame `number` to its neighbours: see Reprojections.
 
         InputError unless the file has the frame and a neighbour.
         """
@@ -44,7 +51,9 @@ class CameraFile:
         try:
             for k in near:
                 self._check_shared(number, number + k)
-            return Reprojections(near[0], near.get(-1), near.get(1), **options)
+            return Reprojections(
+                near[0], near.get(-1), near.get(1), depth_kind=depth_kind, far=far, window=window
+            )
         except InputError as error:
             raise InputError(f"{self.path}: frame {number:g}: {error}") from None
 

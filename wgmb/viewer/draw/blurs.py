@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import Any
 
 import wgpu
 
@@ -42,7 +43,7 @@ class Blurs:
 
     def __init__(self, device: wgpu.GPUDevice, choices: Choices, pace: Pace):
         self._device, self._choices, self._pace = device, choices, pace
-        self._blurs: OrderedDict[tuple, _Kept] = OrderedDict()
+        self._blurs: OrderedDict[tuple[Any, ...], _Kept] = OrderedDict()
         in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self._most = _IN_SOFTWARE if in_software else _MEMORY
 

@@ -19,7 +19,7 @@ from .place import Box, key_box, overlap, whole
 
 BLIT = "viewer/draw/blit.wgsl"
 _COMPOSE = "viewer/draw/compose.wgsl"
-_COMPOSED: list[dict] = [{"buffer": {"type": "uniform"}}] + 2 * [
+_COMPOSED: list[dict[str, Any]] = [{"buffer": {"type": "uniform"}}] + 2 * [
     {"texture": {"sample_type": "unfilterable-float"}}
 ]
 _MOST_TAPS = 4  # texels a side that are averaged for one pixel
@@ -33,7 +33,7 @@ class Image:
 
     texture: wgpu.GPUTexture | None
     kind: str  # COLOR, DEPTH, MOTION, DISPLAY
-    stamp: tuple  # changes with what is in it
+    stamp: tuple[Any, ...]  # changes with what is in it
     array: np.ndarray | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -81,7 +81,7 @@ class View:
         return names.get(self.state.mode, self.state.mode.upper())
 
     @property
-    def stamp(self) -> tuple:
+    def stamp(self) -> tuple[Any, ...]:
         """All that the picture depends on."""
         state, box = self.state, (self.place, self.area, self.size, self.ratio)
         return (self.images, *box, self.mode, state.exposure, state.tone, state.gain,
@@ -97,12 +97,12 @@ class Composer:
     def __init__(self, device: wgpu.GPUDevice, format: str, in_bands: bool = False):
         self.device, self._images, self._format = device, TexturePool(device), format
         self._none = self._images.view("none", (1, 1), "rgba16float")
-        self._pipelines: OrderedDict[tuple, Any] = OrderedDict()
-        self._uploaded: dict[str, tuple] = {}
+        self._pipelines: OrderedDict[tuple[Any, ...], Any] = OrderedDict()
+        self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._texture: wgpu.GPUTexture | None = None
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
         self._in_bands = in_bands
-        self._composed: tuple = ()
+        self._composed: tuple[Any, ...] = ()
         self._visible: Box = (0, 0, 1, 1)
         self.seconds = 0.0  # that the last composing took
 
@@ -198,7 +198,7 @@ def draw(
     device: wgpu.GPUDevice,
     pipeline: Any,
     group: int,
-    resources: list,
+    resources: list[Any],
     target: wgpu.GPUTexture,
     band: tuple[int, int, int, int],
 ) -> None:
@@ -246,7 +246,7 @@ def pipeline(
     )
 
 
-def _layout(device: wgpu.GPUDevice, entries: list[dict]):
+def _layout(device: wgpu.GPUDevice, entries: list[dict[str, Any]]):
     stage = wgpu.ShaderStage.FRAGMENT
     numbered = [{"binding": i, "visibility": stage} | e for i, e in enumerate(entries)]
     return device.create_bind_group_layout(entries=numbered)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from ..state.state import State
 from .adaptive import Pace
@@ -30,7 +31,7 @@ class Detail:
         self.is_complete = False
         """All images of it are."""
         self._stand_in = StandIn(target)
-        self._still: tuple = ()
+        self._still: tuple[Any, ...] = ()
         self._still_since = 0.0
         self._fewest = 0  # pixels for the method that is set
         self._moved = False

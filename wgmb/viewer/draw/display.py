@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import wgpu
 
@@ -21,7 +23,7 @@ class DisplayCache:
         self._device, self._images = device, TexturePool(device)
         self._opened: tuple[ColorSettings | None, Display | None] = None, None
         self._compiled: dict[tuple[Display, ColorSpace], OcioShader | None] = {}
-        self._converted: dict[str, tuple[tuple, Image]] = {}
+        self._converted: dict[str, tuple[tuple[Any, ...], Image]] = {}
 
     def display(self, state: State) -> Display | None:
         """The display that the state asks for; None: sRGB. InputError if there is none such."""

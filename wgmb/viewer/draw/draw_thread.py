@@ -164,7 +164,7 @@ class _Downloads:
 
     def __init__(self, images: TexturePool):
         self._images = images
-        self._kept: dict[str, tuple[tuple, np.ndarray]] = {}
+        self._kept: dict[str, tuple[tuple[Any, ...], np.ndarray]] = {}
 
     def answer(self, renderer: Renderer, drawn: Drawn) -> _Answer:
         """The drawing with its images as arrays."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -27,7 +28,7 @@ class Inspected:
     ):
         self._device, self._images, self._timing = device, TexturePool(device), timing
         self._choices, self._blurs = choices, blurs
-        self._kept: tuple[tuple, dict[str, np.ndarray]] = ((), {})
+        self._kept: tuple[tuple[Any, ...], dict[str, np.ndarray]] = ((), {})
 
     def __call__(
         self, state: State, looks: Collection[str], image: Slot, report: FrameStatus

@@ -62,7 +62,7 @@ class OcioShader:
         stage = wgpu.ShaderStage.COMPUTE
         dimensions = {2: "1d", 3: "2d", 4: "3d"}
         unfiltered = {"sample_type": "unfilterable-float"}
-        entries: list[dict] = [
+        entries: list[dict[str, Any]] = [
             {"texture": unfiltered},
             {"storage_texture": {"format": OUTPUT}},
             {"buffer": {"type": "uniform"}},
@@ -139,7 +139,7 @@ class OcioShader:
 def _with_textures(shader: Shader) -> str:
     """OpenColorIO's GLSL with textures and samplers apart, as WebGPU has them."""
 
-    def apart(match: re.Match) -> str:
+    def apart(match: re.Match[str]) -> str:
         start, kind, name = match.groups()
         sampler = "linear" if name in shader.interpolated else "nearest"
         return (
@@ -155,7 +155,7 @@ def _with_buffers(text: str, binding: int) -> tuple[str, list[np.ndarray]]:
     """The same with lists of numbers in buffers, as the compiler copies constants at each use."""
     found: list[np.ndarray] = []
 
-    def buffered(list_: re.Match) -> str:
+    def buffered(list_: re.Match[str]) -> str:
         if len(found) == _MOST_LISTS:
             return list_[0]
         kind, name, count, values = list_.groups()

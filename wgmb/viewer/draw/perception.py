@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -29,7 +30,7 @@ class _Held:
     """One frame, and how many of its samples are in it."""
 
     texture: wgpu.GPUTexture
-    known: tuple = ()
+    known: tuple[Any, ...] = ()
     """The finding about a video's motion at that time."""
     done: int = 0
 
@@ -56,7 +57,7 @@ class Perceived:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._sum = device, WeightedSum(device)
         self._frames: dict[int, _Held] = {}
-        self._alike: tuple = ()
+        self._alike: tuple[Any, ...] = ()
         self._token = device.create_buffer(size=4, usage=wgpu.BufferUsage.COPY_SRC)
 
     def draw(
@@ -70,7 +71,7 @@ class Perceived:
         antialias: int,
         seconds: float,
         timing: Clock | None,
-        known: list[tuple],
+        known: list[tuple[Any, ...]],
     ) -> int:
         """Draw frames that are missing, the newest first, for about `seconds`; how many are done.
 

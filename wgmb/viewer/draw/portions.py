@@ -24,7 +24,7 @@ class Portions(WallClock):
         self._wanted = wanted
         self.empty = 0.0  # one was not measured before every pass; to submit it takes time too
 
-    def take(self, label: str, encoder) -> None:
+    def take(self, label: str, encoder: wgpu.GPUCommandEncoder) -> None:
         """Submit the one pass in `encoder`, and time it."""
         self._took.append(self._run(encoder))
         self.labels.append(label)

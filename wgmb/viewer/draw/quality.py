@@ -6,6 +6,7 @@ import importlib.util
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ class Measured:
 
     samples: int  # of the reference
     psnr: float  # dB; infinite if they are the same
-    flip: Future | None = None
+    flip: Future[Any] | None = None
 
 
 class Quality:
@@ -29,14 +30,14 @@ class Quality:
 
     def __init__(self):
         self._worker = crew(1, "flip")
-        self._last: tuple[tuple, Measured] | None = None
+        self._last: tuple[tuple[Any, ...], Measured] | None = None
 
-    def latest(self, key: tuple) -> Measured | None:
+    def latest(self, key: tuple[Any, ...]) -> Measured | None:
         """Return the latest measurement of the images identified by `key`."""
         return self._last[1] if self._last and self._last[0] == key else None
 
     def measure(
-        self, key: tuple, done: int, total: int, pictures: Callable[[], list[np.ndarray]]
+        self, key: tuple[Any, ...], done: int, total: int, pictures: Callable[[], list[np.ndarray]]
     ) -> None:
         """Measure if it is time to: the reference has `done` of `total` samples.
 

@@ -240,13 +240,13 @@ class Renderer:
 
     def _advance(
         self,
-        slot,
-        name,
-        view,
-        state,
-        subject,
-        size,
-        antialias,
+        slot: str,
+        name: str,
+        view: str | None,
+        state: State,
+        subject: Subject,
+        size: tuple[int, int],
+        antialias: int,
         quick: bool,
         full: bool,
         report: FrameStatus,
@@ -293,7 +293,9 @@ class Renderer:
         if not (quick or full) and self.choices.has_preview(state, name):
             self.detail.observe_still(took, math.prod(size))
 
-    def _known(self, name: str, state: State, subject: Subject, full: bool) -> list[tuple]:
+    def _known(
+        self, name: str, state: State, subject: Subject, full: bool
+    ) -> list[tuple[Any, ...]]:
         """The findings about a video's motion, all that are needed if `full`.
 
         One entry for each output frame that is needed, the present one first.
@@ -311,16 +313,16 @@ class Renderer:
 
     def _draw(
         self,
-        coming,
-        slot,
-        name,
-        view,
-        state,
+        coming: Slot,
+        slot: str,
+        name: str,
+        view: str | None,
+        state: State,
         subject: Subject,
         seconds: float,
         quick: bool,
         moving: bool,
-        known: list[tuple],
+        known: list[tuple[Any, ...]],
     ) -> None:
         size, antialias = coming.fine[:2]
         # What moves is not dropped, and the next pass is recorded while one is computed.
@@ -374,7 +376,7 @@ class Renderer:
         return self.quality.latest(key)
 
 
-def _coarser(a: tuple, b: tuple) -> bool:
+def _coarser(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
     """Return True if an image of quality `a` is coarser than one of quality `b`."""
     if a[3] != b[3]:
         return a[3]

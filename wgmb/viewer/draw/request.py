@@ -27,7 +27,7 @@ class Request:
     """Everything at once, however long it takes."""
 
     @property
-    def picture(self) -> tuple:
+    def picture(self) -> tuple[Any, ...]:
         """All that the images depend on."""
         state = self.state
         return (

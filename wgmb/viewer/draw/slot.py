@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import wgpu
 
@@ -14,8 +15,8 @@ class Slot:
     """One image and how far it has come."""
 
     label: str = ""
-    key: tuple = ()  # what is drawn
-    fine: tuple = ()  # how finely: width and height, rays, level while moving
+    key: tuple[Any, ...] = ()  # what is drawn
+    fine: tuple[Any, ...] = ()  # how finely: width and height, rays, level while moving
     name: str = ""  # of its texture
     kind: str = "COLOR"
     texture: wgpu.GPUTexture | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from typing import Any
 
 from .adaptive import MOST_PATIENCE, PATIENCE, Pace
 
@@ -24,7 +25,7 @@ class StandIn:
 
     def __init__(self, target: float):
         self._target = target
-        self._key: tuple = ()
+        self._key: tuple[Any, ...] = ()
         self._begin_anew()
 
     def _begin_anew(self) -> None:
@@ -37,7 +38,7 @@ class StandIn:
         self.pace = Pace(HALF, self._target)
         self._took: deque[float] = deque(maxlen=3)
 
-    def begin(self, key: tuple) -> None:
+    def begin(self, key: tuple[Any, ...]) -> None:
         """Forget all observations, if `key` (the picture and its method) is another one."""
         if key != self._key:
             self._key = key

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import wgpu
 
 from ... import gpu
@@ -23,7 +25,7 @@ class VideoLight:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
-        self._converted: dict[str, tuple[tuple, Image]] = {}
+        self._converted: dict[str, tuple[tuple[Any, ...], Image]] = {}
 
     def image(self, slot: str, image: Image, coding: Coding) -> Image:
         """`image` as linear Rec. 709 light of a display; `slot`: on which side it is.

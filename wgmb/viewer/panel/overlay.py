@@ -78,7 +78,9 @@ def tell(recording: str, message: str, area: Box) -> None:
         tag(message, x + width / 2, y + height - 40, middle=True)
 
 
-def tag(text: str, x: float, y: float, *, right=False, middle=False, color=INK) -> None:
+def tag(
+    text: str, x: float, y: float, *, right: bool = False, middle: bool = False, color: int = INK
+) -> None:
     """`text` from `x` on, before it, or about it."""
     size = imgui.calc_text_size(text)
     x -= size.x * (1.0 if right else 0.5 if middle else 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -72,7 +73,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     return state
 
 
-def _parameter(ui: Widgets, name: str, value, default):
+def _parameter(ui: Widgets, name: str, value: Any, default: object):
     """A parameter of the scene as it now stands."""
     ui.label(name)
     if isinstance(default, str):

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -88,14 +89,32 @@ class Widgets:
             imgui.end_combo()
         return now
 
-    def slide(self, state: State, name: str, low, high, form: str, *, log=False, label="") -> State:
+    def slide(
+        self,
+        state: State,
+        name: str,
+        low: float,
+        high: float,
+        form: str,
+        *,
+        log: bool = False,
+        label: str = "",
+    ) -> State:
         """The state with its field `name` as the slider stands."""
         now = getattr(state, name)
         changed, value = self.slider(name, now, low, high, form, log=log, label=label)
         return replace(state, **{name: value}) if changed else state
 
     def setting(
-        self, state: State, name: str, low, high, form: str, *, log=False, label=""
+        self,
+        state: State,
+        name: str,
+        low: float,
+        high: float,
+        form: str,
+        *,
+        log: bool = False,
+        label: str = "",
     ) -> State:
         """The state with the option `name` of its settings as the slider stands."""
         now = state.setting(name)
@@ -103,7 +122,15 @@ class Widgets:
         return state.with_settings(**{name: value}) if changed else state
 
     def slider(
-        self, name: str, now: float, low, high, form: str, *, log=True, label=""
+        self,
+        name: str,
+        now: float,
+        low: float,
+        high: float,
+        form: str,
+        *,
+        log: bool = True,
+        label: str = "",
     ) -> tuple[bool, float]:
         """Draw a slider; returns whether it was moved, and its value."""
         self.label(label or name)
@@ -111,7 +138,7 @@ class Widgets:
         self.keep(name)
         return changed, value
 
-    def number(self, name: str, value, default: bool | int | float) -> tuple[bool, object]:
+    def number(self, name: str, value: Any, default: bool | int | float) -> tuple[bool, object]:
         """Draw a control for a number; returns whether it was changed, and its value."""
         self.label(name.replace("_", " "))
         if isinstance(default, bool):

@@ -39,7 +39,7 @@ def _line(name: str, value: object) -> str:
     return f"{name} = {text}\n".replace("\x7f", "\\u007f")  # which JSON leaves as it is
 
 
-def tables(text: str) -> dict[str, dict]:
+def tables(text: str) -> dict[str, dict[str, Any]]:
     """The tables of the text: [render] or [blur], and [view]; InputError if there are others."""
     found = parse(text)
     if unknown := found.keys() - {"render", "blur", "view"}:
@@ -51,7 +51,9 @@ def tables(text: str) -> dict[str, dict]:
     return found
 
 
-def values(table: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool) -> dict:
+def values(
+    table: dict[str, Any], view: dict[str, Any], plain: object, on_disk: bool
+) -> dict[str, Any]:
     """Fields of the State `plain`, changed to those of [render], or [blur], and [view]."""
     known = {"fps": str | float}
     for group in GROUPS.values():

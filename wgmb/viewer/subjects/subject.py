@@ -52,7 +52,7 @@ class SceneSubject:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._render = Render(builtin.make(next(iter(builtin.SCENES))), Blur("tap", device=device))
-        self._scene_key: tuple = ()
+        self._scene_key: tuple[Any, ...] = ()
         self._held = self._render.scene
 
     def has(self, state: State) -> frozenset[str]:
@@ -133,11 +133,11 @@ class ClipSubject:
         self._device, self._images = device, TexturePool(device)
         blur, space = state.blur, state.color.space(display)
         self._clip = state.input.open(state.source, blur.holdout, blur.scale, space)
-        self._headers: dict[tuple, FrameFile] = {}  # what the frames say of their colours
-        self._layers: dict[tuple, dict[str, str]] = {}
+        self._headers: dict[tuple[Any, ...], FrameFile] = {}  # what the frames say of their colours
+        self._layers: dict[tuple[Any, ...], dict[str, str]] = {}
         self._frames: OrderedDict[_Which, Frame] = OrderedDict()
         self._sharp, self._panorama = Blur("tap", device=device), PanoramaCanvas()
-        self._uploads: OrderedDict[tuple, _Uploads] = OrderedDict()
+        self._uploads: OrderedDict[tuple[Any, ...], _Uploads] = OrderedDict()
         self._now = self._which(state)
 
     @cached_property
@@ -247,7 +247,7 @@ class ClipSubject:
         self._frames.move_to_end(key)
         return self._frames[key]
 
-    def _inputs(self, blur: Blur, is_whole: bool = True) -> dict:
+    def _inputs(self, blur: Blur, is_whole: bool = True) -> dict[str, Any]:
         """The frame's textures, one set for all methods that take the same.
 
         `is_whole`: a panorama has room beyond its edges for the blur.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -99,7 +100,9 @@ class VideoSubject:
 
     # ---- what is known --------------------------------------------------------------------
 
-    def stamp(self, states: Sequence[State], shutter: Shutter, neighbours: bool) -> list[tuple]:
+    def stamp(
+        self, states: Sequence[State], shutter: Shutter, neighbours: bool
+    ) -> list[tuple[Any, ...]]:
         """Findings about the pictures that contribute to the output frames, one entry for each.
 
         Missing motion is requested, that of the first output frame first, and while playing also
@@ -248,7 +251,7 @@ class VideoSubject:
             indices, factors = self._frames.surroundings(cell.index)
             frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
 
-            def light(index: int, names: dict = names) -> wgpu.GPUTexture:
+            def light(index: int, names: dict[str, Any] = names) -> wgpu.GPUTexture:
                 other, name = self._frames(index), names[index]
                 if self._lit.get(name) is not other.color:
                     self._images.upload(name, padded(other.color, 4, 1), "rgba32float")
