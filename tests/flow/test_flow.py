@@ -14,16 +14,13 @@ from wgmb import (
 )
 from wgmb.flow import homography as flow_homography
 from wgmb.flow import passes as flow_passes
-from wgmb.flow.carry import carry
 from wgmb.flow.dominant import follow_most, settled
 from wgmb.flow.homography import dominant_homography
-from wgmb.flow.match import matched
-from wgmb.flow.mend import mend
 from wgmb.flow.passes import STATES, FlowPasses
 from wgmb.flow.pyramid import COARSER, features, level_sizes
 from wgmb.flow.result import result
 from wgmb.flow.search import FullSearch
-from wgmb.flow.shot import EFFORTS, Shot
+from wgmb.flow.shot import EFFORTS, Shot, carry, matched, mend
 from wgmb.flow.sweeps import SweptLevel, half_sweep, polish, sweep
 from wgmb.flow.views import (
     AROUND,

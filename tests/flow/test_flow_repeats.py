@@ -20,10 +20,9 @@ from twins import flow as twin_flow
 from twins import guide as twin
 from wgmb import Flow
 from wgmb.flow.guide import begun, descended, median
-from wgmb.flow.match import matched
 from wgmb.flow.passes import STATES
 from wgmb.flow.pyramid import features
-from wgmb.flow.repeats import follow_guide
+from wgmb.flow.shot import follow_guide, matched
 from wgmb.flow.sweeps import SweptLevel, half_sweep
 
 SIZE = (13, 9)

@@ -10,8 +10,7 @@ from wgpu.backends.wgpu_native import _api
 from wgpu.backends.wgpu_native import ffi as ffi_of_wgpu
 from wgpu.backends.wgpu_native._ffi import get_wgpu_header
 
-from wgmb.gpu.c_types import quicken
-from wgmb.gpu.device import claim
+from wgmb.gpu.device import claim, quicken
 
 pytestmark = pytest.mark.fast
 

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from test_blur_video import SIZE, lumas, moving, run, write
 
-from wgmb.run.trial.places import places
+from wgmb.run.trial.trial import places
 from wgmb.video.clock import Clock
 
 WIDTH, HEIGHT = SIZE

@@ -17,7 +17,7 @@ from wgmb.video.pixels import (
     planes_of,
 )
 from wgmb.video.read.reader import VideoReader
-from wgmb.video.write.scheduling import kept_scheduling
+from wgmb.video.write.container import kept_scheduling
 
 pytestmark = pytest.mark.fast
 

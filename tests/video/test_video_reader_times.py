@@ -16,7 +16,7 @@ from wgmb.video.read.decoder import decoded
 from wgmb.video.read.packets import completed
 from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Timeline, Times
-from wgmb.video.write.scheduling import kept_scheduling
+from wgmb.video.write.container import kept_scheduling
 
 pytestmark = pytest.mark.fast
 

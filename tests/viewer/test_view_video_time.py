@@ -18,7 +18,7 @@ from wgmb.video.read.timeline import Times
 from wgmb.viewer import State, controls
 from wgmb.viewer.draw.perception import seen_frames
 from wgmb.viewer.panel.panel import made_of
-from wgmb.viewer.panel.video_section import at_pace, in_part
+from wgmb.viewer.panel.sections import at_pace, in_part
 from wgmb.viewer.panel.widgets import shortened
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.subjects.video_exposure import exposure_of, picture_at

@@ -7,9 +7,9 @@ import pytest
 from viewer_hand import ALONE, SMALL, put
 from wgmb import gpu
 from wgmb.viewer.draw.adaptive import Pace
+from wgmb.viewer.draw.detail import HALF, StandIn
 from wgmb.viewer.draw.renderer import Renderer
 from wgmb.viewer.draw.request import Request
-from wgmb.viewer.draw.stand_in import HALF, StandIn
 
 FULL = 960 * 540
 FEWEST = round(FULL * Pace.SCALES[HALF] ** 2)

@@ -23,17 +23,14 @@ import wgpu
 
 from .. import gpu
 from ..errors import InputError
-from .carry import carry
+from ..gpu import wgsl
 from .dominant import follow_most, settle
 from .guide import finer, guide
 from .homography import enlarged
 from .lights import find_lights, follow_lights, move_lights
-from .match import matched
-from .mend import mend
 from .passes import STATES, Bindings, FlowPasses
 from .pyramid import all_sizes, features, level_sizes
 from .raising import raised, reduced
-from .repeats import follow_guide
 from .result import Motion, result
 from .search import FullSearch
 from .sweeps import SweptLevel, polish, sweep
@@ -346,3 +343,147 @@ class Shot:
                 if isinstance(made, Motion):
                     textures = [made.motion, made.depth]
                 self._passes.give(*(t for t in textures if isinstance(t, wgpu.GPUTexture)))
+
+
+# ---- the bindings of match.wgsl: a frame's features, and those of the frames it is compared with
+
+
+FINEST_STRIDE, STRIDE = 1.0, 2.0  # between the samples of a patch [px]: finest level, coarser
+MOST_SHADE = 0.08  # difference in grey that may be the light's, on coarser levels; 0 on the finest
+FAR_PRICE = 0.03  # for being hidden in the near frame, if the far one is two frames away
+
+
+def matched(
+    passes: FlowPasses, views: Views, features: dict[int, list[wgpu.GPUTexture]], level: int
+) -> Bindings:
+    """Bindings by their names, and the override `VIEWS`; `features`: levels by frame number."""
+    far = views.near if views.far is None else views.far
+    view = passes.uniform(
+        "match.wgsl",
+        "View",
+        far_factor=views.factor,
+        far_price=FAR_PRICE if views.factor == BESIDE else 0.0,
+        stride=STRIDE if level else FINEST_STRIDE,
+        most_shade=MOST_SHADE if level else 0.0,
+    )
+    return {
+        "constants": {"VIEWS": int(wgsl.load("flow/match.wgsl").constant(views.kind))},
+        "view": view,
+        "linear": passes.linear,
+        "here": features[views.here][level],
+        "near": features[views.near][level],
+        "far": features[far][level],
+    }
+
+
+# ---- states of a frame carried along their flow into its neighbour, as guesses there ----------
+
+
+def carry(
+    passes: FlowPasses,
+    size: tuple[int, int],
+    matched: Bindings,
+    states: wgpu.GPUTexture,
+    along: float,
+    turn: float,
+) -> wgpu.GPUTexture:
+    """States as seen from the neighbour; no motion where nothing lands.
+
+    `matched`: the bindings of match.wgsl for the frame that the states are of. `along`: 1 if
+    their flow leads to the neighbour, -1 if its continuation does. `turn`: -1 if the neighbour's
+    own flow leads back, 1 if it leads on.
+    """
+    item = wgsl.load("flow/carry.wgsl").dtype("Landing").itemsize
+    output = passes.take(size, STATES)
+    own = {
+        "carry": passes.uniform("carry.wgsl", "Carry", along=along, turn=turn),
+        "states": states,
+        "landings": passes.landings.at_least(item * size[0] * size[1]),
+        "output": output,
+    }
+    for entry in ("clear", "claim", "settle", "fetch"):
+        passes.run("carry.wgsl", entry, size, **own, **matched)
+    return output
+
+
+# ---- pixels that are not found again take over the state of the surface they belong to --------
+
+
+def mend(
+    passes: FlowPasses,
+    size: tuple[int, int],
+    matched: Bindings,
+    views: Views,
+    states: wgpu.GPUTexture,
+    neighbours: dict[int, tuple[Views, wgpu.GPUTexture]],
+) -> wgpu.GPUTexture:
+    """States of a frame, those that lead astray replaced.
+
+    `neighbours`: views and states of the frames directly beside it, by their numbers.
+    """
+    near_views, near = neighbours[views.near]
+    sides = {"near": near_views.leads_by(views.here)}
+    far = near
+    if len(views.neighbours) == 2:
+        far_views, far = neighbours[views.neighbours[1]]
+        sides["far"] = far_views.leads_by(views.here)
+    lost = passes.scratch(size, "r32uint", "lost")
+    none = passes.scratch((1, 1), "r32uint", "none lost")
+    output = passes.take(size, STATES)
+    for entry, read, written in (("find_lost", none, lost), ("mend", lost, none)):
+        passes.run(
+            "mend.wgsl",
+            entry,
+            size,
+            others=passes.uniform("mend.wgsl", "Others", **sides),
+            states=states,
+            near_states=near,
+            far_states=far,
+            lost=read,
+            lost_out=written,
+            output=output,
+            **matched,
+        )
+    return output
+
+
+# ---- the lead of the guide where the picture repeats or turns back ----------------------------
+
+
+def follow_guide(
+    passes: FlowPasses,
+    size: tuple[int, int],
+    matched: Bindings,
+    states: wgpu.GPUTexture,
+    guide: wgpu.GPUTexture,
+    back: list[wgpu.GPUTexture],
+    coarser: wgpu.GPUTexture | None = None,
+) -> tuple[wgpu.GPUTexture, wgpu.GPUTexture]:
+    """States, those of the guide where it leads; and the lead, for the sweeps on finer levels.
+
+    `guide`: displacements that guide.py found; `back`: the same of the near frame and of the far
+    one, to this frame, if they are on different sides. `coarser`: the lead of the coarser level,
+    if there is one, which holds where no other is found. The given states are taken back.
+    """
+    constants = matched["constants"] | {"IS_COARSEST": coarser is None}
+    found = passes.scratch(size, "r32uint", "found")
+    none = passes.scratch((1, 1), "r32uint", "none found")
+    output, lead = passes.take(size, STATES), passes.take(size, STATES)
+    for entry, read, written in (("find", none, found), ("follow", found, none)):
+        passes.run(
+            "repeats.wgsl",
+            entry,
+            size,
+            states=states,
+            guide=guide,
+            found=read,
+            found_out=written,
+            output=output,
+            lead=lead,
+            coarser_lead=guide if coarser is None else coarser,
+            near_back=back[0] if back else guide,
+            far_back=back[-1] if back else guide,
+            **matched | {"constants": constants},
+        )
+    passes.give(states)
+    return output, lead

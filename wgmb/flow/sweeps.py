@@ -26,7 +26,7 @@ class SweptLevel:
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
     `most`: the homography of most of the picture to the near frame, on this level; `lead`: the
-    lead of the guide, see repeats.py.
+    lead of the guide, see `follow_guide`.
     """
 
     number: int

@@ -1,7 +1,5 @@
 """A trial of the settings of a video: some places of it, each beside the original."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +22,6 @@ from ..engine import IsDone, RunOptions
 from ..file_sink import BlurredFrame, run_into
 from ..report import BatchReport, Progress
 from ..video import VideoPlan, VideoRun
-from .places import places
 
 MOST = 20  # places of a trial
 _LENGTH = Fraction(1)  # of a place in a video [s]
@@ -128,3 +125,20 @@ class TriedSheet(TriedFrames):
 
 def _as_frame(number: int, image: np.ndarray) -> BlurredFrame:
     return BlurredFrame(number, [Result(FrameFile(number, Path(), None, {}, {}), image)])
+
+
+# ---- places of a video at which settings are tried --------------------------------------------
+
+
+def places(plan: VideoPlan, count: int, length: Fraction) -> list[tuple[Fraction, Fraction]]:
+    """Begin and end in the input [s] of parts of a `length`, evenly spaced in the selected part.
+
+    The whole of it if the parts would meet.
+    """
+    reader, clock = plan.reader, plan.clock
+    begin = reader.times[0] if clock.first is None else max(clock.first, reader.times[0])
+    end = reader.until if clock.end is None else min(clock.end, reader.until)
+    if end - begin <= count * length:
+        return [(begin, end)]
+    middles = (begin + (end - begin) * (2 * k + 1) / (2 * count) for k in range(count))
+    return [(middle - length / 2, middle + length / 2) for middle in middles]
