@@ -89,7 +89,7 @@ def digest(folder: Path) -> str:
 
 def compare(what: str, folder: Path, pattern: str, method: str) -> None:
     """Print the CPU of two workers beside that of one process, with and without starting them."""
-    from wgmb.run.farm.farm import Farm, as_farm_job
+    from wgmb.farm.farm import Farm, as_farm_job
 
     whole = blurred(pattern, folder / "a", "--method", method)
     shared = blurred(pattern, folder / "b", "--method", method, "--workers", 2)
@@ -143,7 +143,7 @@ def children(process: int) -> list[int]:
 
 def kill(folder: Path, times: int = 20) -> None:
     """Workers killed at random."""
-    from wgmb.run.farm.farm import Farm, as_farm_job
+    from wgmb.farm.farm import Farm, as_farm_job
 
     pattern = shot(folder / "in", 96)
     blurred(pattern, folder / "whole", "--method", "tap")
@@ -184,7 +184,7 @@ def kill(folder: Path, times: int = 20) -> None:
 
 def farm(folder: Path, frames: int, workers: int, seconds: float) -> None:
     """Workers that wait."""
-    from wgmb.run.farm.farm import Farm
+    from wgmb.farm.farm import Farm
 
     job = farm_stub.long_job(folder, frames)
     memory: list[tuple[int, float]] = []

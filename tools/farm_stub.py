@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import make_frames as make
-from wgmb.run.farm.plugin import BlurPlugin
+from wgmb.farm.plugin import BlurPlugin
 from wgmb.run.job import Job, settle
 from wgmb.run.report import BatchReport
 from wgmb.run.request import BlurRequest

@@ -52,6 +52,10 @@ EXTRAS = {
 }
 """Every package of an extra, by the name that Python imports."""
 
+WINGS = {"farm": "cluster", "hosts": "notebook", "lab": "compare", "testing": "testing",
+         "viewer": "view"}  # fmt: skip
+"""Folders without which the rest of wgmb works, and the extra that each is for."""
+
 
 def is_installed(package: str) -> bool:
     """Return True if the package is there; it is not loaded."""
@@ -83,11 +87,13 @@ def needed_by(feature: str, extra: str = "") -> Iterator[None]:
 
 
 def reason(error: ImportError, extra: str = "") -> str:
-    """The package that is missing or too old and the command that installs it, or "".
+    """The package or wing that is missing or too old and what installs it, or "".
 
-    "" is for errors that are not about a package of an extra.
+    "" is for errors that are not about a package of an extra, nor about a wing of wgmb.
     """
-    package = (error.name or "").partition(".")[0]
+    package, _, inner = (error.name or "").partition(".")
+    if package == __package__ and (wing := inner.partition(".")[0]) in WINGS:
+        return f"this copy of wgmb has no wgmb/{wing}; the extra {extra or WINGS[wing]} is for it"
     if package not in EXTRAS:
         return ""
     of, name, _ = EXTRAS[package]

@@ -5,8 +5,8 @@ import signal
 from pathlib import Path
 
 from wgmb import DeviceError
+from wgmb.farm.plugin import BlurPlugin
 from wgmb.io import atomic
-from wgmb.run.farm.plugin import BlurPlugin
 
 
 class WithoutGpu(BlurPlugin):

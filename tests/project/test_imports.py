@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wgmb.extras import EXTRAS
+from wgmb.extras import EXTRAS, WINGS
 
 pytestmark = pytest.mark.fast
 
@@ -29,7 +29,7 @@ LAYERS = [
     {"output"},
     {"settings"},
     {"run"},
-    {"hosts", "lab", "testing", "viewer"},  # never each other
+    set(WINGS),  # the rest works without each of them; never each other
     {"cli"},  # may start the viewer
     {"__init__", "__main__"},
 ]
@@ -46,8 +46,8 @@ HOMES = {
     "cv2": {"flow"},
     "PyOpenColorIO": {"color"},
     "opentimelineio": {"shots"},
-    "distributed": {"run"},
-    "dask": {"run"},
+    "distributed": {"farm"},
+    "dask": {"farm"},
     "cyclopts": {"cli"},
     "rich": {"cli"},
     "imgui_bundle": {"viewer"},

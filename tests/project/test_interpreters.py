@@ -34,7 +34,7 @@ MAY_START = {  # other programs; the test below looks at the words that they are
 }  # fmt: skip
 
 
-WORKERS = "wgmb/run/farm/local.py"  # whose processes dask starts
+WORKERS = "wgmb/farm/local.py"  # whose processes dask starts
 
 
 def names_of_modules() -> set[str]:
@@ -129,7 +129,7 @@ import sys
 from pathlib import Path
 sys.path.extend({paths!r})
 from make_job import job_of
-from wgmb.run.farm.farm import Farm, as_farm_job
+from wgmb.farm.farm import Farm, as_farm_job
 if __name__ == "__main__":
     report = Farm(workers=1).blur(as_farm_job(job_of("shot.####.exr", Path(sys.argv[1]))))
     assert len(report.done) == 3, report

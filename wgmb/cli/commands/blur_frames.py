@@ -42,7 +42,7 @@ def blur_job(
 
 def blur_on_farm(job: Job, crew: Crew, console: Console, adapter: str | None = None) -> int:
     """Blur frames of a job in several processes; returns the exit code."""
-    from ...run.farm.farm import Farm, as_farm_job
+    from ...farm.farm import Farm, as_farm_job
 
     console.say(*job.remarks)
     loud = Console()

@@ -70,7 +70,7 @@ def view(
     """
     try:
         with needed_by("view", "view"):
-            from ... import viewer
+            import wgmb.viewer as viewer  # its absence has a name, which that of `from` lacks
     except ImportError as error:  # of a system library
         raise DeviceError(
             f"the viewer cannot be loaded: {error}; on Debian, Ubuntu: "

@@ -19,9 +19,9 @@ from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ... import interpreter
-from ...errors import DeviceError
-from ...io import leftovers
+from .. import interpreter
+from ..errors import DeviceError
+from ..io import leftovers
 
 _NEVER = "1 hour"
 _QUIET: dict[str, Any] = {
@@ -46,7 +46,7 @@ _QUIET: dict[str, Any] = {
     # A machine that is busy with starting many workers answers late.
     "distributed.comm.timeouts.connect": "1 minute",
 }
-_LOADED_ONCE = ["wgpu.backends.wgpu_native", "wgmb.run.farm.preloaded"]
+_LOADED_ONCE = ["wgpu.backends.wgpu_native", "wgmb.farm.preloaded"]
 _CLOSING = 5.0  # seconds
 _KILLING = 0.4  # seconds until a killed process is gone
 _TRIES = 3  # of removing a folder

@@ -16,13 +16,13 @@ from typing import Any
 
 from distributed import Worker, WorkerPlugin, get_worker
 
-from ... import interpreter
-from ..._version import __version__
-from ...errors import DeviceError, Error
-from ...sequence.findings import Range, numbers
-from ...threads import Stop, is_main
-from ..job_file import of_text
-from ..report import BatchReport, Progress
+from .. import interpreter
+from .._version import __version__
+from ..errors import DeviceError, Error
+from ..run.job_file import of_text
+from ..run.report import BatchReport, Progress
+from ..sequence.findings import Range, numbers
+from ..threads import Stop, is_main
 
 _PAUSE = 0.25  # seconds between two messages on frames that are done
 

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DeviceError, Error, InputError
-from ...io.frame_numbers import frame_list
-from ...sequence.findings import ranges
-from ...threads import within
-from ..engine import ON_REQUEST
-from ..job import Job
-from ..report import BatchReport, Failure, Progress, describe_input
+from ..errors import DeviceError, Error, InputError
+from ..io.frame_numbers import frame_list
+from ..run.engine import ON_REQUEST
+from ..run.job import Job
+from ..run.report import BatchReport, Failure, Progress, describe_input
+from ..sequence.findings import ranges
+from ..threads import within
 from . import local, merge
 from .workers import (
     LATE,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ... import gpu
+from .. import gpu
 
 SMALLEST, LARGEST = 4, 64  # frames of a part
 _PARTS_EACH = 4  # parts that a worker does, at least, so that all end at about the same time

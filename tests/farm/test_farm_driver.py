@@ -10,13 +10,13 @@ from make_job import job_of
 
 import make_frames as make
 from wgmb import BatchReport, DeviceError, InputError
+from wgmb.farm import driver as farm_driver
+from wgmb.farm import merge
+from wgmb.farm.driver import Driver
+from wgmb.farm.farm import Farm
+from wgmb.farm.plugin import WorkerState
+from wgmb.farm.workers import size_of_part
 from wgmb.io.frame_numbers import frame_list
-from wgmb.run.farm import driver as farm_driver
-from wgmb.run.farm import merge
-from wgmb.run.farm.driver import Driver
-from wgmb.run.farm.farm import Farm
-from wgmb.run.farm.plugin import WorkerState
-from wgmb.run.farm.workers import size_of_part
 from wgmb.sequence.findings import numbers
 
 COUNT = 12

@@ -5,7 +5,7 @@ import ssl
 
 import pytest
 
-from wgmb.run.farm.encryption import Encryption
+from wgmb.farm.encryption import Encryption
 
 
 def connected(security):

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError
-from ...extras import needed_by
-from ...io import leftovers
-from ..job import Job
-from ..job_file import stored, time_there
-from ..report import BatchReport, Progress
+from ..errors import InputError
+from ..extras import needed_by
+from ..io import leftovers
+from ..run.job import Job
+from ..run.job_file import stored, time_there
+from ..run.report import BatchReport, Progress
 from .driver import Driver
 from .local import closing, local_client
 from .workers import SMALLEST, WorkerPool, hardware_adapters

@@ -6,7 +6,7 @@ when to stop; this process ends with the run, by a pipe.
 
 import signal
 
-from ...interpreter import handle_signals
+from ..interpreter import handle_signals
 from . import plugin as plugin
 
 handle_signals(signal.SIG_IGN)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..report import BatchReport
+from ..run.report import BatchReport
 
 
 def share(report: BatchReport, numbers: Iterable[int]) -> None:

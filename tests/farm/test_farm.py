@@ -19,10 +19,10 @@ from make_job import job_of
 import make_frames as make
 from wgmb import DeviceError, gpu
 from wgmb.extras import install_command
-from wgmb.run.farm import farm as farming
-from wgmb.run.farm.farm import Farm, as_farm_job
-from wgmb.run.farm.local import local_client
-from wgmb.run.farm.workers import hardware_adapters
+from wgmb.farm import farm as farming
+from wgmb.farm.farm import Farm, as_farm_job
+from wgmb.farm.local import local_client
+from wgmb.farm.workers import hardware_adapters
 
 COUNT = 12
 
@@ -197,7 +197,7 @@ def test_for_a_worker_that_is_lost_at_its_start_another_one_comes(monkeypatch):
     """Seen where a worker lost its first connection: it ends, and no other takes its place."""
     from distributed import Client
 
-    from wgmb.run.farm import local
+    from wgmb.farm import local
 
     wait = local._wait_for
 
