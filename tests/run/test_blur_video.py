@@ -312,7 +312,7 @@ def test_the_next_quicker_choice_is_named(settings, method, said):
 
 
 def test_without_a_gpu_and_opencv_a_line_says_what_would_be_quicker(capsys, monkeypatch):
-    for module in ("wgmb.settings.video", "wgmb.run.video"):
+    for module in ("wgmb.settings.recipes", "wgmb.run.video"):
         monkeypatch.setattr(f"{module}.is_installed", lambda package: False)
     for flow in ("auto", "search"):
         run = VideoRequest(video=VideoSettings(flow=flow)).open()

@@ -242,6 +242,6 @@ def test_a_search_is_one_in_the_quality_that_is_asked_for(device, quality):
 
 
 def test_without_a_gpu_and_opencv_a_draft_is_searched(as_without_a_gpu, monkeypatch):
-    monkeypatch.setattr("wgmb.settings.video.is_installed", lambda package: False)
+    monkeypatch.setattr("wgmb.settings.recipes.is_installed", lambda package: False)
     motion, how = VideoSettings().source(gpu.open_device())
     assert type(motion) is Flow and how == "search (draft, because there is no GPU)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import wgpu
@@ -49,7 +50,11 @@ def result(
         read_apart: wgpu.GPUTexture = none,
         **written: wgpu.GPUTexture,
     ) -> None:
-        outputs = {"motion_out": spare, "apart_out": spare, "depth_out": spare_depth}
+        outputs: dict[str, Any] = {
+            "motion_out": spare,
+            "apart_out": spare,
+            "depth_out": spare_depth,
+        }
         outputs |= written
         passes.run(
             "motion.wgsl",

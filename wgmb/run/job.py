@@ -35,8 +35,9 @@ from ..sequence.frame_file import about
 from ..sequence.input_color import space_of
 from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
+from ..settings.recipes import by_place
 from ..settings.record import record
-from ..settings.video import VideoSettings, by_place
+from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
 from ..threads import Stop
 from .conversion import RateConversion, RateConversionStages

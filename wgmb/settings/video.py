@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Literal, Self
 
 import wgpu
 
-from .. import gpu
 from ..color.highlights import Expansion
 from ..errors import InputError
-from ..extras import is_installed
 from ..io.frame_numbers import frame_numbers
 from ..shots.motion import MotionSource
 from ..video.clock import Clock
+from .recipes import METHODS_BY_FLOW, FlowName, FlowQuality, Recipe, recipe_of
 
 if TYPE_CHECKING:
     from ..video.read.reader import VideoReader
@@ -26,64 +25,36 @@ if TYPE_CHECKING:
 class FlowSettings:
     """Source of the motion of pictures."""
 
-    flow: Literal["auto", "search", "dis", "none"] = "auto"
+    flow: FlowName = "auto"
     "Source of the motion: search (best), dis (quick, OpenCV), none (pictures are averaged)."
-    flow_quality: Literal["best", "fast", "draft"] = "best"
+    flow_quality: FlowQuality = "best"
     "Quality of the motion: best, fast, or draft, which searches smaller pictures."
 
     @property
     def method(self) -> str:
-        """The blur method that suits this motion: OpenCV's dense inverse search is to be quick.
-
-        Of settings that are `chosen`, as "auto" may become that.
-        """
-        return "gather" if self.flow in ("auto", "search") else "tap"
+        """The blur method that suits the motion of settings that are `chosen`."""
+        return METHODS_BY_FLOW[self.flow]
 
     def source(self, device: wgpu.GPUDevice) -> tuple[MotionSource | None, str]:
         """The source of the motion, and its description in words."""
-        settings, how = self.chosen(device)
-        if settings.flow == "none":
-            return None, how
-        if settings.flow == "auto":
-            from ..flow.dense import DenseInverseSearch
-
-            return DenseInverseSearch(device=device), how
-        if self.is_by_place(device):
-            return by_place(), how
-        if settings.flow == "dis":
-            from ..flow.dis import Dis  # only where it is needed
-
-            return Dis(settings.flow_quality), how
-        from ..flow import Flow
-
-        return Flow(quality=settings.flow_quality, device=device), how
+        recipe = self._recipe(device)
+        return recipe.make(recipe.quality or self.flow_quality, device), recipe.words
 
     def is_by_place(self, device: wgpu.GPUDevice) -> bool:
         """True if "auto" becomes dense inverse search that is made better by place."""
-        return self.flow == "auto" and self.chosen(device)[0].flow != "search"
+        return self._recipe(device).has_edges_gathered
 
     def chosen(self, device: wgpu.GPUDevice) -> tuple[Self, str]:
         """A copy in which `flow` is chosen as it suits the device, and the choice in words.
 
         It stays "auto" for dense inverse search on a GPU, with a search of blocks.
         """
-        if self.flow == "none":
-            return self, "none: pictures are averaged"
-        is_draft = self.flow_quality == "draft"
-        if is_draft and self.flow == "dis":
-            raise InputError("`flow_quality` draft is for `flow` search; dis is best or fast")
-        flow, quality, why = self.flow, self.flow_quality, ""
-        software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        if flow == "auto" and not software and not is_draft:
-            return self, "dense inverse search on the GPU, and in blocks where something is fast"
-        if flow == "auto" and software and not is_draft:
-            flow, quality = ("dis", "fast") if is_installed("cv2") else ("search", "draft")
-            why = f" ({quality}, because there is no GPU)"
-            if flow == "dis":
-                why += "; finer, and searched in blocks, where something is fast"
-        flow = "dis" if flow == "dis" else "search"
-        words = "dense inverse search" if flow == "dis" else "search"
-        return replace(self, flow=flow, flow_quality=quality), f"{words}{why}"
+        recipe = self._recipe(device)
+        quality = recipe.quality or self.flow_quality
+        return replace(self, flow=recipe.flow, flow_quality=quality), recipe.words
+
+    def _recipe(self, device: wgpu.GPUDevice) -> Recipe:
+        return recipe_of(self.flow, self.flow_quality, device)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,13 +137,6 @@ class VideoSettings(FlowSettings):
             end = None if numbers[-1] + 1 == len(reader) else reader.times[numbers[-1] + 1]
         begin = reader.begin(others) if first is None else first
         return Clock(begin, self.pace, Fraction(0), first, end)
-
-
-def by_place() -> MotionSource:
-    """The source that "auto" becomes without a GPU."""
-    from ..flow.dis.by_place import ByPlace  # only where it is needed
-
-    return ByPlace()
 
 
 def time_of(name: str, text: str | None) -> Fraction | None:
