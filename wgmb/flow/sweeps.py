@@ -22,7 +22,7 @@ MOST_PASSES = 1000  # on one level
 
 @dataclass(frozen=True)
 class SweptLevel:
-    """What stays the same in the sweeps over one level of a frame.
+    """The fixed part of the sweeps over one level of a frame.
 
     `matched`: the bindings of match.wgsl; `carried`: the near frame's states, and the far one's;
     `most`: the homography of most of the picture to the near frame, on this level; `lead`: the

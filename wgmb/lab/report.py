@@ -289,7 +289,7 @@ def _grid(
             key = ' data-value=""' if value is None else key
             text = escape(_text(value, digits[i]))
             if i == 0 and str(value) in colors:
-                text = f'<span class="dot" style="background:{colors[value]}"></span>{text}'
+                text = f'<span class="dot" style="background:{colors[str(value)]}"></span>{text}'
             cells.append(f"<td{mark}{key}>{text}</td>")
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return (

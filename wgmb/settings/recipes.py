@@ -18,7 +18,7 @@ FlowQuality = Literal["best", "fast", "draft"]
 
 
 class Recipe(NamedTuple):
-    """How motion is found in pictures, and how they are blurred by it."""
+    """A source of motion, and the method that blurs by it."""
 
     flow: FlowName
     "The setting `flow` that does the same; there is none for inverse search on the GPU: auto."

@@ -9,7 +9,6 @@ from pathlib import Path
 import glfw
 import numpy as np
 from imgui_bundle import imgui
-from rendercanvas import BaseRenderCanvas
 
 from .. import interpreter
 from ..color.srgb import linear
@@ -21,6 +20,7 @@ from ..video.write.frames import FrameVideo
 from .draw.draw_thread import DrawThread
 from .draw.renderer import Renderer
 from .draw.screen import Screen, ScreenThread
+from .scaled_canvas import ScaledCanvas
 from .state.dropped import source_of
 from .state.state import State
 from .state.video_time import rate
@@ -31,7 +31,7 @@ class Actions:
 
     def __init__(
         self,
-        canvas: BaseRenderCanvas,
+        canvas: ScaledCanvas,
         stage: Renderer | DrawThread,
         screen: Screen | ScreenThread,
         say: Callable[[str], None],
@@ -41,7 +41,7 @@ class Actions:
         self._stage, self._screen, self._say, self._quit = stage, screen, say, quit
         self._video: FrameVideo | None = None
         self._windowed: tuple[int, int, int, int] | None = None
-        self.export: tuple[subprocess.Popen[bytes], str] | None = None
+        self.export: tuple[subprocess.Popen[str], str] | None = None
         self.export_message = ""
 
     @property
@@ -167,7 +167,7 @@ class Actions:
             glfw.set_window_monitor(window, monitor, 0, 0, *mode.size, mode.refresh_rate)
 
 
-def _end(child: subprocess.Popen[bytes]) -> None:
+def _end(child: subprocess.Popen[str]) -> None:
     """Have an export leave nothing behind, and end."""
     child.terminate()
     child.wait()

@@ -90,11 +90,12 @@ class Viewer:
         has_display: Callable[[], bool] = lambda: True,
         clock: Callable[[], float] = time.perf_counter,
     ):
-        self.canvas = canvas = ScaledCanvas(canvas, interface)
+        scaled: Any = ScaledCanvas(canvas, interface)  # has all that the canvas has
+        self.canvas = scaled
         self.state = state.settled()  # loads what reads ranges of frames, before one waits for it
         self.clock = clock
         self.device = device or gpu.open_device()
-        self._context = canvas.get_wgpu_context()
+        self._context = scaled.get_wgpu_context()
         # Plain formats: the picture and ImGui's colours are display values already.
         format = self._context.get_preferred_format(self.device.adapter).removesuffix("-srgb")
         usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.COPY_DST
@@ -108,7 +109,7 @@ class Viewer:
         else:
             self.stage, self.screen = Renderer(self.device), Screen(self.device, format)
         self.panel = Panel()
-        self.actions = Actions(canvas, self.stage, self.screen, self.say, self._quit)
+        self.actions = Actions(scaled, self.stage, self.screen, self.say, self._quit)
         self.failed: BaseException | None = None
         self.message = ("", 0.0)  # and until when it is shown
         self._recent = recent
@@ -117,7 +118,7 @@ class Viewer:
         self._call_soon = call_soon
         self._drawn: Drawn | None = None
         self._is_answered = False  # the last request, which is what is on the screen
-        self._imgui = ImguiRenderer(self.device, canvas)
+        self._imgui = ImguiRenderer(self.device, scaled)
         style()
         self._imgui.set_gui(self._noted_gui)
         self._gui_error: Exception | None = None
@@ -137,9 +138,9 @@ class Viewer:
         self._scopes = Scopes(self.device, self._imgui.backend)
         self._inspected = 0  # lines of the inspector
         # Before ImGui's handlers, which keep to themselves what they take.
-        canvas.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
-        canvas.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
-        canvas.request_draw(self._draw_unless_failed)
+        scaled.add_event_handler(self._guarded(self._on_any), *_SEEN, order=-201)
+        scaled.add_event_handler(self._guarded(self._on_event), *_HANDLED, order=-200)
+        scaled.request_draw(self._draw_unless_failed)
 
     # ---- events --------------------------------------------------------------------------
 

@@ -79,7 +79,13 @@ def tell(recording: str, message: str, area: Box) -> None:
 
 
 def tag(
-    text: str, x: float, y: float, *, right: bool = False, middle: bool = False, color: int = INK
+    text: str,
+    x: float,
+    y: float,
+    *,
+    right: bool = False,
+    middle: bool = False,
+    color: tuple[float, float, float, float] = INK,
 ) -> None:
     """`text` from `x` on, before it, or about it."""
     size = imgui.calc_text_size(text)

@@ -75,7 +75,7 @@ def scene(ui: Widgets, state: State, info: Info) -> State:
     return state
 
 
-def _parameter(ui: Widgets, name: str, value: Any, default: object):
+def _parameter(ui: Widgets, name: str, value: Any, default: Any):
     """A parameter of the scene as it now stands."""
     ui.label(name)
     if isinstance(default, str):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -254,7 +254,7 @@ class VideoSubject:
             indices, factors = self._frames.surroundings(cell.index)
             frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
 
-            def light(index: int, names: dict[str, Any] = names) -> wgpu.GPUTexture:
+            def light(index: int, names: Mapping[int | None, str] = names) -> wgpu.GPUTexture:
                 other, name = self._frames(index), names[index]
                 if self._lit.get(name) is not other.color:
                     self._images.upload(name, padded(other.color, 4, 1), "rgba32float")
