@@ -35,7 +35,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "made"), str(ROOT / "tools")]
 
-import farm_stub  # noqa: E402
+import measured_farm  # noqa: E402
 
 import make_frames as make  # noqa: E402
 
@@ -93,14 +93,14 @@ def compare(what: str, folder: Path, pattern: str, method: str) -> None:
 
     whole = blurred(pattern, folder / "a", "--method", method)
     shared = blurred(pattern, folder / "b", "--method", method, "--workers", 2)
-    job = farm_stub.job_of(pattern, folder / "one", method)
+    job = measured_farm.job_of(pattern, folder / "one", method)
     cpu = time.process_time()
     job.run()()
     one = time.process_time() - cpu
     log = folder / "cpu"
     os.environ["WGMB_STUB_LOG"] = str(log)
-    job = as_farm_job(farm_stub.job_of(pattern, folder / "two", method))
-    Farm(workers=2, plugin=farm_stub.Timed).blur(job)
+    job = as_farm_job(measured_farm.job_of(pattern, folder / "two", method))
+    Farm(workers=2, plugin=measured_farm.Timed).blur(job)
     each: dict[str, list[float]] = {}
     for line in log.read_text().splitlines():
         process, seconds = line.split()
@@ -154,14 +154,14 @@ def kill(folder: Path, times: int = 20) -> None:
     while tally["killed"] < times and runs < 10 * times:  # some end before the shot
         runs += 1
         out = folder / f"out{runs}"
-        job = as_farm_job(farm_stub.job_of(pattern, out))
+        job = as_farm_job(measured_farm.job_of(pattern, out))
         died, begun, over = [], threading.Event(), threading.Event()
 
         def shoot(wait: float, begun=begun, over=over, died=died) -> None:
             begun.wait()
             if over.wait(wait):
                 return
-            workers = [p for p in children(os.getpid()) if farm_stub.is_worker(p)]
+            workers = [p for p in children(os.getpid()) if measured_farm.is_worker(p)]
             if workers:
                 os.kill(luck.choice(workers), signal.SIGKILL)
                 died.append(1)
@@ -186,16 +186,16 @@ def farm(folder: Path, frames: int, workers: int, seconds: float) -> None:
     """Workers that wait."""
     from wgmb.farm.farm import Farm
 
-    job = farm_stub.long_job(folder, frames)
+    job = measured_farm.long_job(folder, frames)
     memory: list[tuple[int, float]] = []
     done = [0]
 
     def tick(number: int, state: str) -> None:
         done[0] += 1
         if done[0] % max(frames // 10, 1) == 0:
-            memory.append((done[0], farm_stub.memory_of(os.getpid())))
+            memory.append((done[0], measured_farm.memory_of(os.getpid())))
 
-    place = Farm(workers=workers, plugin=farm_stub.Waiting, patience=600)
+    place = Farm(workers=workers, plugin=measured_farm.Waiting, patience=600)
     os.environ["WGMB_STUB_SECONDS"] = str(seconds)
     started, cpu = time.monotonic(), 0.0
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from farm_stub import is_worker
+from measured_farm import is_worker
 
 import make_frames as make
 from wgmb.cli import app
