@@ -18,8 +18,8 @@ class ProgramPreset:
     options: Mapping[str, Any]
 
 
-def _program(name: str, **options: Any) -> ProgramPreset:
-    return ProgramPreset(name, MappingProxyType(options))
+def _program(name: str, **values: Any) -> ProgramPreset:
+    return ProgramPreset(name, MappingProxyType(values))
 
 
 PROGRAMS: dict[str, ProgramPreset] = {
