@@ -82,7 +82,37 @@ def wires():
     return Scene("wires", (*_room(), *wires), shot)
 
 
-SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner, wires)}
+def barrel():
+    """A barrel turns about its axis, by 8.6 degrees a frame: its outline rests, its surface does
+    not."""
+    pattern = CREAM, RED, "CHECKER", (12, 8)
+    body = Body("cylinder", (0.8, 0.8, 1.0), _turning(0.1, 1.2, -0.6, 0.15, lean=0.1), *pattern)
+    return Scene("barrel", (*_room(), body), _before_the_wall())
+
+
+def ball():
+    """A ball turns about an upright axis, by 23 degrees a frame."""
+    pattern = CREAM, BLUE, "BRICKS", (14, 10)
+    body = Body("sphere", (0.9,) * 3, _turning(0.1, 1.3, -0.6, 0.4, lean=0.3), *pattern)
+    return Scene("ball", (*_room(), body), _before_the_wall())
+
+
+def _before_the_wall():
+    return CameraPath(lambda t: (0 * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
+
+
+def _turning(x, y, z, turn, lean):
+    """A place, upright but for the angle `lean`, with `turn` radians a frame about its axis."""
+    return lambda t: (
+        translation(x, y, z, t)
+        @ rotation("z", lean, t)
+        @ rotation("x", np.pi / 2, t)
+        @ rotation("z", turn * FPS * t, t)
+    )
+
+
+TURNING = (barrel, ball)
+SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner, wires, *TURNING)}
 
 
 def soft_disk(t, size=(90, 160), speed=18.0, soft=10.0):
@@ -107,12 +137,23 @@ def sharp(name, scene=None):
     """The frame of a scene, or of that of this name, between its neighbours."""
     if name == "soft_disk":
         return frame_of([soft_disk(t) for t in (0, -1, 1)])
-    render = Render(scene or SCENES[name](), Blur("gather", shutter=0), size=SIZE, antialias=6)
+    scene = scene or SCENES[name]()
+    render = Render(scene, Blur("gather", shutter=0), size=SIZE, antialias=6)
     own, prev, after = (
-        Frame(f.color, depth=f.depth, motion=render.blur.motion(f))
-        for f in (render.frame(t / FPS) for t in (0, -1, 1))
+        Frame(f.color, depth=f.depth, motion=_vectors(render, f, t))
+        for t, f in ((t, render.frame(t / FPS)) for t in (0, -1, 1))
     )
     return own.between(prev, after)
+
+
+def _vectors(render, frame, t, fine=4):
+    """Those of the middles of pixels; of bodies that turn, means over pixels, as Blender's are."""
+    if render.scene.name not in [scene.__name__ for scene in TURNING]:
+        return render.blur.motion(frame)
+    width, height = SIZE
+    larger = Render(render.scene, render.blur, size=(fine * width, fine * height))
+    parts = render.blur.motion(larger.frame(t / FPS)).reshape(height, fine, width, fine, 4)
+    return parts.mean(axis=(1, 3)) / fine
 
 
 def truth(name, degrees, scene=None):

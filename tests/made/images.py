@@ -6,23 +6,24 @@ import wgmb
 from wgmb import Camera
 
 
-def crossing(size, offset, seed=0, wall=True):
+def crossing(size, offset, seed=0, wall=True, turns=False):
     """A box over a wall, both moving and textured, as a renderer with antialiasing sees it.
 
-    Without the `wall`, over nothing, with the vectors of the middles of pixels.
+    Without the `wall`, over nothing, with the vectors of the middles of pixels. A box that `turns`
+    moves within its outline, which rests, as the wall does.
     """
     rng = np.random.default_rng(seed)
     height, width = size
     fine = 4
     y, x = (np.mgrid[: height * fine, : width * fine] + 0.5) / fine
     waves = rng.normal(size=(2, 4, 3))
-    speeds = np.array([[1.5, -0.5], [-14.0, 6.0]])  # of wall and box [px a frame]
+    # Of wall and box [px a frame].
+    speeds = np.array([[0.0, 0.0], [-3.0, 0.6]] if turns else [[1.5, -0.5], [-14.0, 6.0]])
     depths = np.array([9.0, 4.0])
     bend = np.array([[0, 0], [0.5, 1.0]])
     way = [v * offset + b * offset**2 for v, b in zip(speeds, bend, strict=True)]
-    box = (abs(x - width / 2 - way[1][0]) < width / 6) & (
-        abs(y - height / 2 - way[1][1]) < height / 4
-    )
+    left, down = (0.0, 0.0) if turns else way[1]
+    box = (abs(x - width / 2 - left) < width / 6) & (abs(y - height / 2 - down) < height / 4)
     which = box.astype(int)
     color = np.zeros((*which.shape, 4))
     for k in (0, 1):

@@ -52,6 +52,18 @@ def test_gather_is_its_twin_where_depths_contradict_colours():
     assert differing_from_gather(sources, 360) < 0.01
 
 
+def test_gather_is_its_twin_where_a_body_turns_under_its_outline():
+    """Nothing is separated there: an outline that rests shows the same of both sides."""
+    sources = [(offset, *crossing((24, 40), offset, turns=True)) for offset in (0, -1, 1)]
+    prev, after = sources[1:]
+    alone, between = (
+        (gather_twin.separate(*sources[0], 0.25, **around).depth[1] > 0).sum()
+        for around in ({}, {"prev": prev, "next": after})
+    )
+    assert alone > 20 and between == 0
+    assert differing_from_gather(sources, 180) < 0.01
+
+
 def test_gather_is_its_twin_out_of_focus():
     """A wide rim, over which motions change evenly, has no edge in it while it moves slowly."""
     sources = [(offset, *soft_disk(offset, size=(24, 72))) for offset in (0, -1, 1)]

@@ -1,5 +1,6 @@
 """Three-frame reconstruction: one pixel, one time, one frame, one seed at a time."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -317,6 +318,12 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
         pure = [(j, i) for j, i in pixels if not edges[j, i]] or [(y, x)]
         return min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)
 
+    if not thin and outline_rests(z, (y, x), between, behind, before, around_it):
+        place = nearest_pure(farther)
+        path = np.concatenate([behind, told_around[0][place]])
+        front_depth = mean(z, front) * told_around[1][place]
+        return color[y, x], path, front_depth, 1.0, 0 * color[y, x], path, 0.0, False
+
     back_depth = mean(z, back)
     seen = seen_background(around_it, behind, back_depth, y, x)
     if seen is None:
@@ -373,6 +380,26 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     front_depth = z[y, x] if whole and z[y, x] < between else mean(z, front)
     front_depth, back_depth = front_depth * ratios[front_place], back_depth * ratios[back_place]
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
+
+
+def outline_rests(z, at, between, behind, before, around_it):
+    """True if an outline and what is behind it rest, while the surface in front moves."""
+
+    def changes(vectors):
+        """Pixels of the 5 x 5 whose side in a neighbour, where the vectors lead, is another."""
+        found = 0
+        size = np.array(z.shape)
+        for j, i in itertools.product(range(-2, 3), repeat=2):
+            px = np.array((at[0] + j, at[1] + i))
+            is_front = z[tuple(np.clip(px, 0, size - 1))] < between
+            for frame, step in zip(around_it, (vectors[1::-1], vectors[:1:-1]), strict=True):
+                if frame is not None:
+                    there = np.clip(px + np.round(step).astype(int), 0, size - 1)
+                    found += (valid(frame[3][tuple(there)]) < between) != is_front
+        return found
+
+    back_rests = behind @ behind < 0.25
+    return back_rests and changes(np.zeros(4)) == 0 and changes(before) > 0
 
 
 def coverage_by_color(own, front, back, at_middle, beyond):

@@ -103,7 +103,13 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     if sides.front.total > 0.0 && sides.back.total > 0.0 && sides.back.weight > 0.0 {
         let axis = sides.front_motion - sides.back_motion;
         if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(edge.motion - sides.back_motion, axis) {
-            split_layers(&split, edge, around, sides, axis);
+            if outline_rests(edge, sides) { // the pixel shows the same of both all the time
+                split.front_motion = sides.back_motion;
+                split.front_at = around.back_place.at;
+                split.front_z = sides.front.depth / sides.front.total;
+            } else {
+                split_layers(&split, edge, around, sides, axis);
+            }
         }
     }
     store_layers(edge, split);
@@ -126,6 +132,28 @@ struct Split {          // the layers of an edge pixel
 fn one_layer(edge: EdgePixel, around: Around) -> Split {
     return Split(edge.color, vec4f(0.0), edge.motion, edge.motion, edge.z, 0.0,
                  around.front_place.at, around.back_place.at, 1.0, 0u);
+}
+
+/// True if the outline of the front rests, as does what is behind it, while the front's surface moves: a body that turns about
+/// itself. In the neighbouring frames the same pixels are in front as here, and not where the surface goes.
+fn outline_rests(edge: EdgePixel, sides: Sides) -> bool {
+    let back_rests = dot(sides.back_motion, sides.back_motion) < EDGE_MOTION * EDGE_MOTION;
+    return back_rests && !sides.thin && outline_changes(edge, vec4f(0.0)) == 0u
+        && outline_changes(edge, sides.front_motion) > 0u;
+}
+
+/// How many pixels of the 5 x 5 are in front in a neighbouring frame, where these vectors lead, and not here, or the reverse.
+fn outline_changes(edge: EdgePixel, vectors: vec4f) -> u32 {
+    var changes = 0u;
+    for (var i = 0; i < 25; i++) {
+        let px = edge.px + vec2i(i % 5, i / 5) - 2;
+        let is_front = flagged_depth(flags_at(px)) < edge.between;
+        let before = valid_depth(depth_there(inside(px + vec2i(round(vectors.xy))), false));
+        let after = valid_depth(depth_there(inside(px + vec2i(round(vectors.zw))), true));
+        changes += select(0u, neighbours.has_prev, (before < edge.between) != is_front);
+        changes += select(0u, neighbours.has_next, (after < edge.between) != is_front);
+    }
+    return changes;
 }
 
 /// The two layers of a pixel whose motion is between those of the two sides, along `axis`.
