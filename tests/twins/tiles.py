@@ -14,7 +14,7 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     height, width = color.shape[:2]
     motion = motion.astype(float)
     fastest = _fastest(motion, span, edge)
-    dominant = _dominant(fastest, span)
+    dominant = _dominant(fastest, span, published)
     streak, way = np.zeros((height, width)), np.zeros((height, width, 2))
     for at in np.ndindex(height, width):
         streak[at], way[at] = _streak(motion[at], span), _direction(motion[at], span)
@@ -104,7 +104,7 @@ def _fastest(motion, span, edge):
     return found
 
 
-def _dominant(fastest, span):
+def _dominant(fastest, span, published=False):
     found = np.zeros_like(fastest)
     rows, columns = fastest.shape[:2]
     for j, i in np.ndindex(rows, columns):
@@ -115,7 +115,7 @@ def _dominant(fastest, span):
                     continue
                 motion = fastest[j + dj, i + di]
                 along = displacement(motion, span[1]) - displacement(motion, span[0])
-                if di and dj and along[0] * di * along[1] * dj <= 0:
+                if published and di and dj and along[0] * di * along[1] * dj <= 0:
                     continue  # it does not come this way
                 candidates.append(motion)
         found[j, i] = max(candidates, key=lambda m: _streak(m, span))

@@ -72,8 +72,8 @@ fn find_tile_max(@builtin(global_invocation_id) id: vec3u) {
     tile_max[id.y * tiles.count.x + id.x] = found;
 }
 
-/// NeighborMax: the motion of greatest extent in a tile and those around; of a diagonal neighbour only if it leads
-/// this way (Guertin).
+/// NeighborMax: the motion of greatest extent in a tile and those around. Guertin's counts a diagonal neighbour only if
+/// it leads this way; but pixels up to a quarter of an edge beyond a tile look it up, and some of them lie in the neighbour.
 @compute @workgroup_size(WG_X, WG_Y)
 fn find_neighbor_max(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= tiles.count) { return; }
@@ -87,7 +87,7 @@ fn find_neighbor_max(@builtin(global_invocation_id) id: vec3u) {
         let extent = blur_extent(trajectory_from(candidate), delay_at(centre_of(vec2u(at))));
         let is_beside = abs(by.x) + abs(by.y) < 2;
         let leads_here = extent.x * f32(by.x) * extent.y * f32(by.y) > 0.0;
-        if (is_beside || leads_here) && length(extent) > greatest {
+        if (!PUBLISHED || is_beside || leads_here) && length(extent) > greatest {
             greatest = length(extent);
             found = candidate;
         }
