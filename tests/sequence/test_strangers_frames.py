@@ -445,6 +445,8 @@ def test_directions_and_constants_are_no_candidates():
     some[20:40, 20:40] = rng.random((20, 20))
     assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 0 * still}) == ["a"]
     assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 2 * still}) == []
+    assert vectors.candidates({"P_warp.R": some, "P_warp.G": still}) == ["P_warp"]
+    assert vectors.candidates({"P_w.R": some, "P_w.G": still, "P_w.B": 0 * still}) == []
     assert vectors.candidates({"a.R": still, "a.G": still}) == []
     small = np.zeros((64, 64), np.float32)
     small[5:11, 5:11] = -3

@@ -152,12 +152,12 @@ def direction_of(title: str) -> int | None:
 def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> list[str]:
     """Layers that may hold vectors under a name that does not say so.
 
-    They have two channels, or three, with negative numbers or 0.5 where nothing moves, and are
-    neither unit vectors nor called as something else.
+    They have two channels, or three, with negative numbers or 0.5 where nothing moves, are no unit
+    vectors, and those of three are not called as places or directions in space.
     """
     found = []
     for layer, members in layers(channels, near).items():
-        if not layer or len(members) not in (2, 3) or is_of_space(layer):
+        if not layer or len(members) not in (2, 3) or (len(members) == 3 and is_of_space(layer)):
             continue
         planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
         with np.errstate(all="ignore"):
