@@ -52,8 +52,8 @@ EXTRAS = {
 }
 """Every package of an extra, by the name that Python imports."""
 
-WINGS = {"farm": "cluster", "hosts": "notebook", "lab": "compare", "testing": "testing",
-         "viewer": "view"}  # fmt: skip
+WINGS = {"farm": "cluster", "hosts": "notebook", "lab": "compare", "perceive": "cli",
+         "testing": "testing", "viewer": "view"}  # fmt: skip
 """Folders without which the rest of wgmb works, and the extra that each is for."""
 
 

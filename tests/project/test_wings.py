@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 COMMANDS = {
     "farm": "blur sample/crossing.####.exr -o {} --workers 1",
     "lab": "compare crossing -o {}",
+    "perceive": "perceive crossing -o {}",
     "viewer": "view crossing",
 }
 QUICK = ["tests/project/test_shutter.py", "tests/settings/test_blur_settings.py",

@@ -15,12 +15,12 @@ from ...cone import VIDEOS
 from ...errors import InputError, counted
 from ...extras import needed_by
 from ...io.atomic import write_file
-from ...lab.shutter_study import best_shutter, compare, perception_charts
-from ...run.perceive import perceive as perceive_frames
+from ...perceive.frames import perceive as perceive_frames
+from ...perceive.settings import PerceptionSettings
+from ...perceive.shutter_study import best_shutter, compare, perception_charts
 from ...scene import builtin
 from ...sequence.frame_file import is_video
 from ...settings import OutputSettings
-from ...settings.perception import PerceptionSettings
 from .. import run_log
 from ..console import Console, done_line
 from ..exit_codes import DONE, SOME_FAILED
@@ -29,7 +29,7 @@ from ..options import Adapter, InputOptions, Inputs, LogJson, PerceivedOutputs, 
 from ..terminal import out
 
 if TYPE_CHECKING:
-    from ...run.perceive_video import PerceivedVideo
+    from ...perceive.video import PerceivedVideo
 
 Who = Annotated[PerceptionSettings, Parameter(name="*", group=MAIN)]
 
@@ -89,7 +89,7 @@ def perceive(
         )
     if pattern not in builtin.SCENES and is_video(pattern):
         with needed_by(pattern, "video"):
-            from ...run.perceive_video import perceive_video
+            from ...perceive.video import perceive_video
         video = perceive_video(pattern, output, input, perception, adapter)
         return _write_video(video, pattern, console)
     run = perceive_frames(pattern, output, input, perception, adapter)

@@ -17,16 +17,16 @@ from ..output.output import Output
 from ..output.result import Result
 from ..pipeline.blur import Blur
 from ..render import Render
+from ..run.engine import IsDone, RunOptions, run
+from ..run.file_sink import BlurredFrame, FileSink
+from ..run.report import BatchReport, Progress
 from ..scene import builtin
 from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement, laid, union
 from ..sequence.frame_file import FrameFile
 from ..settings import InputSettings, OutputSettings, parameters_of, size_of
-from ..settings.perception import PerceptionSettings
 from ..settings.record import record
-from .engine import IsDone, RunOptions, run
-from .file_sink import BlurredFrame, FileSink
-from .report import BatchReport, Progress
+from .settings import PerceptionSettings
 
 
 @dataclass(frozen=True)

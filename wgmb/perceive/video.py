@@ -15,8 +15,12 @@ from ..color.coding import CodedPicture, Coding
 from ..cone import Cone
 from ..errors import InputError
 from ..observer import Observer
+from ..run.engine import Blurred, Input, IsDone
+from ..run.report import Progress, VideoReport
+from ..run.video import check_fits
+from ..run.video_output import sounds_kept, write
+from ..run.video_sink import Form
 from ..settings import BlurSettings, InputSettings, OutputSettings
-from ..settings.perception import PerceptionSettings
 from ..settings.record import record
 from ..settings.video import VideoSettings
 from ..video.clock import Clock
@@ -24,11 +28,7 @@ from ..video.linear_frames import VideoPictures
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
-from .engine import Blurred, Input, IsDone
-from .report import Progress, VideoReport
-from .video import check_fits
-from .video_output import sounds_kept, write
-from .video_sink import Form
+from .settings import PerceptionSettings
 
 
 @dataclass(frozen=True)

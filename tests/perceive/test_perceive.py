@@ -9,8 +9,8 @@ from twins import perceive as twin
 from wgmb import InputError, Shutter
 from wgmb.cone import VIDEOS, Cone
 from wgmb.io import stills
-from wgmb.lab.shutter_study import best_shutter, compare, difference
 from wgmb.observer import Observer
+from wgmb.perceive.shutter_study import best_shutter, compare, difference
 
 # Mean differences to perceived nature at 20, 40, 60, 80 rad/s and 60 frames a second.
 TABLE = {

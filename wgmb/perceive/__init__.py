@@ -1,0 +1,1 @@
+"""Frames, scenes and videos as an eye perceives them: each is held, and earlier ones fade."""
