@@ -17,6 +17,7 @@ from ..io import limits
 from ..io.frame_numbers import numbered, patterns_in
 from ..io.suffixes import KNOWN_VIDEOS, STILLS
 from ..shots.cut_list import CutList
+from ..shots.held_poses import may_be_held
 from ..shots.motion import MotionSource
 from .data_windows import Placement
 from .dependencies import Dependencies
@@ -30,7 +31,7 @@ from .layers.light import LightPasses
 from .layers.masks import Masks
 from .layers.passes import Passes
 from .layers.vector_convention import ConventionFinder
-from .neighbours import Neighbours
+from .neighbours import HELD, Neighbours
 
 _SHOWN = 5  # sequences of a folder that are named
 
@@ -266,6 +267,15 @@ class Clip:
         These are all views with a picture, or the chosen one.
         """
         return self.cache.sources(number)
+
+    def holds_poses(self, number: int) -> bool:
+        """True if poses in frame `number` are held, so that their jumps are left out: `twos`."""
+        source = self.source(number)
+        frame = self.frame(source, picture=False, normal=False, light=False)
+        if frame.motion is None or not may_be_held(frame.motion):
+            return False
+        self.with_neighbours(source, normal=False, light=False)
+        return number in self.notes.get(HELD, ())
 
     def forget(self, number: int) -> None:
         """Drop a frame from the cache."""

@@ -20,6 +20,7 @@ from ..shots.cuts import (
     still,
     straightened,
 )
+from ..shots.held_poses import TWOS, may_be_held, without_jumps
 from . import panorama_signs
 from .clip_frame import ClipFrame
 from .data_windows import (
@@ -40,6 +41,10 @@ from .frame_builder import FrameBuilder
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
 
+HELD = (
+    "has poses that are held, as in animation on twos: their jumps are not blurred; "
+    "`twos='off'` blurs them"
+)
 _SIDES = "left", "top", "right", "bottom"
 
 
@@ -53,6 +58,7 @@ class Neighbours:
     def __init__(self, stored: FrameCache, builder: FrameBuilder, is_search: bool):
         check_choice("outside", stored.passes.outside, OUTSIDE)
         check_choice("`wrap`", stored.passes.wrap, panorama_signs.WRAPS)
+        check_choice("`twos`", stored.passes.twos, TWOS)
         self._stored, self._builder, self._is_search = stored, builder, is_search
         self._outside = stored.passes.outside
         self.cuts: set[int] = set()
@@ -129,7 +135,8 @@ class Neighbours:
             if near is not None and beyond is not None:
                 near = near.between(beyond, None) if side < 0 else near.between(None, beyond)
             beside.append(near)
-        return made[0].between(*beside), Placement(onto, self._bounds(source))
+        frame = self._held(source, made[0].between(*beside))
+        return frame, Placement(onto, self._bounds(source))
 
     def opened(
         self, source: FrameFile, wanted: frozenset[str], onto: Window | None = None
@@ -141,7 +148,22 @@ class Neighbours:
             found = self._neighbour(source, frame, side, wanted)
             return self.opened(found[0], wanted, canvas) if found else None
 
-        return ClipFrame.of(self._on(canvas, source, frame), load)
+        placed = self._on(canvas, source, frame)
+        if onto is None and placed.motion is not None and may_be_held(placed.motion):
+            held = self._held(source, placed.between(load(-1), load(1)))
+            return ClipFrame.of(held, lambda side: held.prev if side < 0 else held.next)
+        return ClipFrame.of(placed, load)
+
+    def _held(self, source: FrameFile, frame: Frame) -> Frame:
+        """`frame` without the jumps between poses that are held; says so in a note."""
+        if self._stored.passes.twos == "off":
+            return frame
+        held = without_jumps(frame)
+        if held is frame:
+            return frame
+        if source.number not in (on := self._stored.notes.setdefault(HELD, [])):
+            on.append(source.number)
+        return held.locked()
 
     def _neighbour(
         self, source: FrameFile, frame: Frame, side: int, wanted: frozenset[str]

@@ -61,6 +61,8 @@ class InputSettings:
     "Colours of the input EXR files; outputs are premultiplied, as OpenEXR prescribes."
     wrap: Literal["auto", "on", "off"] = "auto"
     "Panoramas of 360 degrees: motion and blur go on around the left and right edge."
+    twos: Literal["auto", "off"] = "auto"
+    "Animation on twos: jumps between poses that are held are not blurred; off: they are."
     cuts: str | None = None
     """Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 switches the
     detection off; none: no cuts.
@@ -139,6 +141,7 @@ class InputSettings:
             also=self.also,
             outside=self.outside,
             wrap=self.wrap,
+            twos=self.twos,
             alpha=self.alpha,
         )
         clip = Clip(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,7 @@ from ..options import Colors, InputOptions, Inputs
 from ..spelling import as_options
 from ..terminal import out
 
+_FIRST = 3  # frames in which poses that are held are looked for
 _MUCH = 0.25  # of the width: a 99th percentile of speed above it is worth a warning
 
 
@@ -127,6 +129,7 @@ def describe(
         lines.append(("valid", f"vectors are used where {valid} is 1"))
     lines += _about_motion(clip, source, output)
     notes = [("note", as_options(text)) for text, on in clip.notes.items() if source.number in on]
+    lines += _about_poses(clip)
     return [*lines[:beginning], *notes, *lines[beginning:]]
 
 
@@ -137,6 +140,19 @@ def _views_text(clip: Clip, source: FrameFile) -> str:
     if source.shared:
         text += f"; in no view: {', '.join(names.layers(source.shared))}"
     return text if source.view == first else f"{text}; here: {source.view}"
+
+
+def _about_poses(clip: Clip) -> list[tuple[str, str]]:
+    """Return a line if the first frames hold poses: frames on ones may come before them."""
+    held: list[int] = []
+    for number in clip.numbers[:_FIRST]:
+        with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+            held += [number] if clip.holds_poses(number) else []
+    if not held:
+        return []
+    where = f"at {'frame' if len(held) == 1 else 'frames'} {frame_list(held)}"
+    text = f"held, as in animation on twos ({where}): jumps are not blurred; --twos off blurs them"
+    return [("poses", text)]
 
 
 def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tuple[str, str]]:

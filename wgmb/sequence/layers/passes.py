@@ -30,8 +30,10 @@ class Passes:
     the display window: "nothing", "edge" (unknown: the pixels at its edge are repeated) or "auto"
     (unknown if the window cuts through the picture). `wrap`: the left and the right edge are one
     meridian of an equirectangular panorama: "on", "off" or "auto" (by the attribute `envmap`, or
-    where a picture is 2:1 and its edges join or vectors are longer than half its width). `alpha`:
-    the colours of the files are "premultiplied" or "straight".
+    where a picture is 2:1 and its edges join or vectors are longer than half its width). `twos`:
+    poses that are held, as in animation on twos, are shown without the jumps between them where the
+    vectors of a neighbour tell ("auto"), or with them ("off"). `alpha`: the colours of the files
+    are "premultiplied" or "straight".
     """
 
     color: str | None = None
@@ -47,6 +49,7 @@ class Passes:
     also: tuple[str, ...] = ()
     outside: str = "auto"
     wrap: str = "auto"
+    twos: str = "auto"
     alpha: str = "premultiplied"
 
     @property
