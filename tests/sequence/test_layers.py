@@ -28,6 +28,12 @@ RENDERERS = {
         list(RGBA), "VRayZDepth.R", "vray"),
     "plain": (
         ["R", "G", "B", "Z", "velocity.x", "velocity.y"], ["R", "G", "B"], "Z", "plain"),
+    "guerilla": (
+        ["R", "G", "B", "Depth", "MotionVector.r", "MotionVector.g"],
+        ["R", "G", "B"], "Depth", "arnold"),
+    "karma": (
+        [*RGBA, "depth", "P.x", "P.y", "P.z", "motionvector.x", "motionvector.y", "motionvector.z"],
+        list(RGBA), "depth", "arnold"),
     "nothing": (["R", "G", "B"], ["R", "G", "B"], None, None),
 }  # fmt: skip
 

@@ -157,10 +157,13 @@ def test_the_picture_is_not_read_as_vectors(tmp_path, capsys):
 # ---- stills that hold numbers ---------------------------------------------------------------
 
 
+OTHER_STILLS = ("png", "u1"), ("tif", "u2")
+
+
 @pytest.mark.parametrize("most", [16.0, pytest.param(64.0, marks=pytest.mark.full)])
 @pytest.mark.parametrize(
     ("form", "kind"),
-    [("png", "u1"), ("png", "u2"), pytest.param("tif", "u2", marks=pytest.mark.full)],
+    [("png", "u2"), *(pytest.param(*one, marks=pytest.mark.full) for one in OTHER_STILLS)],
 )
 def test_motion_around_half_is_found_with_its_unit(tmp_path, form, kind, most):
     """As After Effects and ReelSmart Motion Blur take it: y up, 1 is a motion of `most` px."""
@@ -307,8 +310,8 @@ UNITS = {  # numbers of a motion to the next frame [px, y down]: as programs wri
 @pytest.mark.parametrize(
     "unit",
     [
-        *list(UNITS)[3:6],
-        *(pytest.param(u, marks=pytest.mark.full) for u in (*list(UNITS)[:3], *list(UNITS)[6:])),
+        *list(UNITS)[3:5],
+        *in_full(*list(UNITS)[:3], *list(UNITS)[5:]),
     ],
 )
 def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
@@ -318,7 +321,7 @@ def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
     is_right(clip, 0.05)
 
 
-@pytest.mark.parametrize("unit", ["-1 to 1, backwards", "of the longest motion"])
+@pytest.mark.parametrize("unit", ["-1 to 1, backwards", *in_full("of the longest motion")])
 def test_what_crosses_half_of_the_picture_does_not_hide_the_unit(tmp_path, unit):
     """Numbers of a few pixels lie beyond -1 and 1, or 0 and 1."""
     numbers, names, _ = UNITS[unit]

@@ -194,7 +194,10 @@ def find_depth(
         k: found for k in by_layer if (found := ending(k, _DEPTH)) and not is_of_space(k, found)
     }
     ranked = sorted(kinds, key=lambda k: (not is_whole(k, kinds[k]), _DEPTH.index(kinds[k])))
-    return by_layer[ranked[0]][0] if ranked else None
+    if ranked:
+        return by_layer[ranked[0]][0]
+    alone = (m for members in by_layer.values() for m in members if not is_component(m))
+    return next((m for m in alone if is_depth(m)), None)
 
 
 def find_triple(names: Iterable[str], stems: Collection[str], near: str | None = None) -> list[str]:
