@@ -60,3 +60,22 @@ def test_a_time_as_colour_space_names_the_option_that_is_meant(tmp_path, capsys)
     text = run(capsys, source, "-o", tmp_path / "b.mkv", "--from", "0:05", code=2)
     assert "--begin" in text and text.count("\n") == 1
     assert make.names_in(tmp_path) == ["a.mkv"]
+
+
+@pytest.mark.parametrize("is_ordered", [True, False])
+def test_ordered_chapters_are_named(tmp_path, is_ordered):
+    """FFmpeg plays such a file from its beginning to its end, and says nothing."""
+
+    def chapters(out):
+        tick = clips.Fraction(1, 1000)
+        one = {"id": 1, "start": 0, "end": 250, "time_base": tick, "metadata": {"title": "one"}}
+        parts = [one, one | {"id": 2, "start": 250, "end": 500}]
+        out.set_chapters(parts)
+
+    path = clips.write(tmp_path / "in.mkv", before=chapters)
+    if is_ordered:  # in the place of another flag of the edition, which is 1
+        data = path.read_bytes()
+        assert data.count(b"\x45\xdb\x81\x01") == 1
+        path.write_bytes(data.replace(b"\x45\xdb\x81\x01", b"\x45\xdd\x81\x01"))
+    notes = VideoReader(path).notes
+    assert any("its chapters are ordered" in note for note in notes) == is_ordered

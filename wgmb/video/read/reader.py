@@ -38,6 +38,7 @@ from .color_tags import assumed, either, tags_of
 from .container import has_alpha_beside, opened, picture_stream, size_of
 from .decoder import REORDERED, Decoder, decoded
 from .deinterlace import Deinterlaced
+from .matroska import has_ordered_chapters
 from .rotation import rotation_of
 from .side_data import SideData, light_level_of, mastering_of, side_data_of
 from .stream_text import StreamText, cropped, stream_texts, whole_samples
@@ -123,6 +124,11 @@ class VideoReader:
                 self.notes.append("its transparency (VP8 or VP9 alpha) is not read")
             if has_alpha_beside(container, stream):
                 self.notes.append("its transparency (a stream of its own, in AVIF) is not read")
+            if self.chapters and has_ordered_chapters(self.path):
+                self.notes.append(
+                    "its chapters are ordered: players may skip or repeat parts, or take some from "
+                    "other files; all of this file is taken once, from beginning to end"
+                )
             self._packets = scanned(container, stream, self.path)
 
     def _check_size(self, stream: VideoStream) -> None:
