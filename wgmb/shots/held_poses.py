@@ -79,7 +79,7 @@ def _leads_far(motion: np.ndarray, side: int) -> np.ndarray:
 
 
 def _jumps(motion: np.ndarray, near: np.ndarray, side: int) -> np.ndarray:
-    """A mask of the vectors to one side that are a jump; the neighbour there has those of `near`."""
+    """A mask of the vectors to one side that are a jump; `near` are the neighbour's."""
     with np.errstate(all="ignore"):
         y, x = np.nonzero(_leads_far(motion, side))
         jump, hold = (vectors[y, x] for vectors in _sides(motion, side))
