@@ -11,13 +11,7 @@ import make_frames as make
 from wgmb.cli import app
 from wgmb.errors import InputError
 from wgmb.gpu import timing
-from wgmb.lab import (
-    bench,
-    bench_figures,
-    bench_report,
-    charts,
-    report,
-)
+from wgmb.lab import bench, bench_figures, bench_report, report
 from wgmb.lab.cases import Candidate
 from wgmb.lab.results import Bars
 from wgmb.methods import METHODS
@@ -116,7 +110,7 @@ def test_text_and_page_tell_every_method(run):
 @pytest.mark.fast
 def test_bars_are_as_long_as_their_parts():
     bars = Bars("times", "ms", {"tap": {"upload": 1.0, "GPU": 2.0}, "gather": {"GPU": 6.0}})
-    drawing = charts.bars_svg(bars, {"upload": "red", "GPU": "blue"})
+    drawing = report.bars_svg(bars, {"upload": "red", "GPU": "blue"})
     found = re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)"', drawing)
     (left, _, one), (middle, _, two), (_, below, six) = (map(float, rect) for rect in found)
     assert (two, six) == (pytest.approx(2 * one, abs=0.3), pytest.approx(6 * one, abs=0.6))

@@ -16,13 +16,7 @@ import pytest
 import make_frames as make
 from wgmb import METHODS, Clip, Frame, Shutter
 from wgmb.errors import InputError
-from wgmb.lab import (
-    cases,
-    charts,
-    compare,
-    report,
-    results,
-)
+from wgmb.lab import cases, compare, report, results
 from wgmb.lab.cases import Candidate, Case
 from wgmb.lab.results import Entry, Report, Table
 from wgmb.metrics import METRICS, measure
@@ -221,10 +215,10 @@ def test_the_floor_stands_in_table_files_and_plots(device, scene_frame, tmp_path
 
 def test_the_line_of_the_floor_lies_where_it_belongs():
     plot = results.Plot("p", "x", "y", {"a": [(1, 0.2), (10, 1.0)]}, floor=0.2)
-    drawn = charts.plot_svg(plot, {"a": "red"})
+    drawn = report.plot_svg(plot, {"a": "red"})
     (at,) = re.findall(r'class="floor" [^>]*y1="([\d.]+)" y2="\1"', drawn)
     assert at == re.findall(r'cy="([\d.]+)"', drawn)[0]
-    assert "floor" not in charts.plot_svg(replace(plot, floor=None), {"a": "red"})
+    assert "floor" not in report.plot_svg(replace(plot, floor=None), {"a": "red"})
 
 
 def test_a_reference_must_trace_the_scene(device, scene_frame):
@@ -308,7 +302,7 @@ def test_the_page_tells_command_machine_and_figures(found):
 
 def test_a_plot_has_every_point_where_it_belongs():
     plot = results.Plot("p", "x", "y", {"a": [(1, 0.0), (10, 0.5), (100, 1.0)]})
-    at = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', charts.plot_svg(plot, {"a": "red"}))
+    at = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', report.plot_svg(plot, {"a": "red"}))
     (x0, y0), (x1, y1), (x2, y2) = [(float(x), float(y)) for x, y in at]
     assert x1 - x0 == pytest.approx(x2 - x1, abs=0.2)
     assert y0 - y1 == pytest.approx(y1 - y2, abs=0.2)
@@ -317,7 +311,7 @@ def test_a_plot_has_every_point_where_it_belongs():
 
 @pytest.mark.parametrize("points", [[(4, 0.2)], [(4, 0.2), (4, 0.2)], [(1, -3.0), (1e4, 1e-9)]])
 def test_a_plot_of_little_is_drawn(points):
-    text = charts.plot_svg(results.Plot("p", "x", "y", {"a": points}), {"a": "red"})
+    text = report.plot_svg(results.Plot("p", "x", "y", {"a": points}), {"a": "red"})
     assert text.count("<circle") == len(points)
     assert "nan" not in text
 

@@ -32,7 +32,7 @@ def homography_of(way: np.ndarray) -> np.ndarray:
 
 
 def ways_of(matrix: np.ndarray, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far right and down a homography leads from places, float32 [px].
+    """Displacements by a homography, right and down, from places, float32 [px].
 
     `x` (columns), `y` (rows, 1): float32.
     """
