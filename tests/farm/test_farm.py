@@ -73,6 +73,7 @@ def test_two_workers_make_the_same_bytes_and_a_frame_that_cannot_be_read_fails_a
 
 
 @DASK_LEAVES_SOCKETS
+@pytest.mark.full
 def test_workers_that_die_leave_nothing_but_whole_files(shot, whole, tmp_path):
     out, said = tmp_path / "out", []
     job = as_farm_job(job_of(shot, out))

@@ -93,6 +93,7 @@ TORUSPHERE = [  # time, camera, degrees, curve, frames per second, density
 ]
 
 
+@pytest.mark.full
 def test_the_torusphere_is_that_of_python(visit, tmp_path):
     files = [tmp_path / f"{i}.png" for i in range(len(TORUSPHERE))]
     steps = []
@@ -286,6 +287,7 @@ def test_files_that_do_not_fit_are_told(visit):
     assert seen["results"] == ["Motion needs two pictures that follow one another, or a video."]
 
 
+@pytest.mark.full
 def test_phones_and_desks(visit):
     tap = {"do": "tap", "of": "#wipe", "at": [0.25, 0.3]}
     line = {"do": "evaluate", "script": "wgmb.state.line"}

@@ -40,6 +40,7 @@ def made(out) -> int:
     return len(list(out.glob("o.*.exr")))
 
 
+@pytest.mark.full
 def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_path, long_shot):
     pattern, whole = long_shot
     out = tmp_path / "out"
@@ -62,7 +63,7 @@ def ignore_ctrl_c():
     [
         (signal.SIGINT, None),
         pytest.param(signal.SIGTERM, None, marks=pytest.mark.full),
-        (signal.SIGTERM, ignore_ctrl_c),
+        pytest.param(signal.SIGTERM, ignore_ctrl_c, marks=pytest.mark.full),
     ],
     ids=["Ctrl-C", "SIGTERM", "SIGTERM in the background"],
 )
@@ -82,7 +83,7 @@ def test_an_interrupted_run_ends_with_130_one_line_and_whole_files(
     assert got.items() <= whole.items()
 
 
-@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+@pytest.mark.parametrize("suffix", ["mp4", pytest.param("gif", marks=pytest.mark.full)])
 def test_an_interrupted_video_leaves_nothing(tmp_path, long_shot, suffix):
     pattern, _ = long_shot
     out, said = tmp_path / "out", tmp_path / "said.txt"

@@ -384,10 +384,12 @@ def test_an_error_while_drawing_ends_the_program(desk):
     assert "ZeroDivisionError: broken" in said
 
 
+@pytest.mark.full
 def test_quitting_while_drawing_releases_the_surface_first(desk):
     assert desk("-c", WATCHED + QUITTING).end() == (0, "")
 
 
+@pytest.mark.full
 def test_the_end_of_the_x_server_is_told_by_xlib_alone(desk):
     """In one line, or in two where the connection is reset before it is closed."""
     code, said = desk("-c", DYING).end()
