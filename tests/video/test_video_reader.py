@@ -247,6 +247,35 @@ def test_an_interlaced_frame_is_two_pictures(tmp_path):
         assert (row * np.arange(64)).sum() / row.sum() == pytest.approx(places[number], abs=0.01)
 
 
+@pytest.mark.parametrize("order", ["tff", "bff"])
+def test_h264_of_fields_has_its_order_of_fields(tmp_path, order):
+    """MBAFF, as broadcasts have it: which field is the first one is a flag of each frame."""
+    graph, first = av.filter.Graph(), int(order == "bff")
+    source = graph.add_buffer(width=128, height=96, format="yuv420p", time_base=Fraction(1, 25))
+    setfield = graph.add("setfield", order)
+    source.link_to(setfield)
+    setfield.link_to(graph.add("buffersink"))
+    graph.configure()
+    frames, chroma = [], np.full((48, 64), 128, np.uint8)
+    for n in range(8):
+        luma = np.full((96, 128), 50, np.uint8)
+        luma[first::2, 4 * n + 10 : 4 * n + 30] = luma[1 - first :: 2, 4 * n + 12 : 4 * n + 32] = (
+            200
+        )
+        one = clips.frame([luma, chroma, chroma], "yuv420p")
+        one.pts, one.time_base = n, Fraction(1, 25)
+        graph.push(one)
+        frames.append(graph.pull())
+    options = {"x264-params": "interlaced=1", "crf": "10"}
+    path = clips.write(tmp_path / "c.ts", frames, [Fraction(n, 25) for n in range(8)],
+                       options=options, rate=Fraction(25), tick=Fraction(1, 25))  # fmt: skip
+    places = []
+    for _, picture in VideoReader(path):
+        row = picture.planes[0].astype(float).mean(0) - 50
+        places.append(float((row * np.arange(128)).sum() / row.sum()))
+    assert np.diff(places) == pytest.approx(2, abs=0.6)
+
+
 def test_two_threads_may_read_one_video_at_the_same_time(tmp_path):
     """On a busy machine the thread that read ahead for one segment may outlive it."""
     footage = VideoReader(clips.write(tmp_path / "c.mp4", options={"g": "4"}))
