@@ -14,9 +14,10 @@ import wgpu
 from ... import gpu
 from ...gpu import wgsl
 from ...gpu.textures import TexturePool
+from ..dis.blocks import HALF, SMALL
 
 FOLDER = "flow/dense"
-COARSEST, SMALL, MIDDLE = 40, 160, 320  # px along the longer side of levels
+COARSEST = 40  # px along the longer side of the coarsest level
 KEPT = 3  # pictures: one and its neighbours
 STATE = "rgba32float"
 _FINER = {"MEDIAN": 2, "RADIUS": 2}, {"MEDIAN": 1, "RADIUS": 3}  # of refine.wgsl, on both levels
@@ -47,7 +48,7 @@ class DenseStages:
         self.images, self._groups = TexturePool(device), gpu.BindGroups()
         self._small, self._middle = (
             next(k for k, s in enumerate(self.sizes) if max(s) <= longest or s == self.sizes[-1])
-            for longest in (SMALL, MIDDLE)
+            for longest in (SMALL, HALF)
         )
         self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
         self._turns: dict[tuple[int, int, int], wgpu.GPUBuffer] = {}

@@ -6,31 +6,37 @@ States are (height, width, 4) to_prev, to_next [px of their level].
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator
 from copy import copy
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...gpu import wgsl
 from .inverse_search import Pictures
 
 SMALL, HALF = 160, 320  # px along the longer side: where blocks are searched, and refined
-BLOCK, SPACING = 8, 4  # px of a block, and from one to the next
 MOST_BLOCKS = 400  # of a picture: those that fit worst
-REACH = 0.2  # of the longer side: how far a block is looked for
 SOFT = 0.8  # px of a Gaussian, so that an error of a part of a pixel hardly shows in texture
-UNFIT = 7.0  # levels of 255 of difference to the better neighbour, in the mean of 3 x 3 pixels
-CHANGED = 10.0  # levels by which such a place must differ from both neighbours, beyond noise
-NOISE = 10  # percentile of these differences that is taken for noise
-OTHER = 0.35  # share of the difference to the neighbour that fits worse,
-MOST_OTHER = 10.0  # of which so many levels count at most, as it may hide the place
-MOST_SQUARE = 150.0  # the same of mean squares
-ALIKE, LEVEL = 1.2, 6.0  # factor and squared levels by which matches are alike
-OTHERWISE = 1.5  # px from the motion before that count as another motion
-AWAY = 1.5  # levels of 255 that a pixel counts in raising
 NEAR = (0, 0), (-1, 0), (0, -1), (0, 1), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)
-FLAT = 2.5  # levels of deviation in a block that tells nothing
-MOST_APART = 40.0  # levels of difference of a pixel that count
+
+
+def constants(file: str, *names: str) -> Iterator[float]:
+    """Those of a shader of the search on a GPU, which has the same steps."""
+    return map(wgsl.load(f"flow/dense/{file}.wgsl").constant, names)
+
+
+BLOCK, SPACING = map(int, constants("summary", "BLOCK", "SPACING"))
+REACH, ALIKE, LEVEL, OTHER, MOST_SQUARE = constants(
+    "blocks", "REACH", "ALIKE", "LEVEL", "OTHER", "MOST_SQUARE"
+)
+UNFIT, CHANGED, FLAT = constants("unfit", "UNFIT", "CHANGED", "FLAT")
+MOST_OTHER, OTHERWISE, BETTER, MORE = constants("spread", "MOST_OTHER", "APART", "BETTER", "LEVEL")
+(NOISE,) = constants("summarize", "NOISE")
+(AWAY,) = constants("raising", "AWAY")
+(MOST_APART,) = constants("differences", "MOST_APART")
+STEPS, LONGEST_STEP, MOST_STEP_APART = constants("refine", "STEPS", "LONGEST_STEP", "MOST_APART")
 
 
 def _cv() -> Any:
@@ -96,7 +102,7 @@ class Reduced:
         better, _ = self.differences(state)
         changes = [_cv().absdiff(self.here, other) for other in self.sides.values()]
         changes = _cv().blur(np.minimum.reduce(changes), (3, 3))
-        is_there = (better > UNFIT) & (changes > CHANGED + np.percentile(changes, NOISE))
+        is_there = (better > UNFIT) & (changes > CHANGED + np.percentile(changes, 100 * NOISE))
         return np.where(is_there, better, 0)
 
 
@@ -166,7 +172,7 @@ def _best_ways(level: Reduced, wanted: np.ndarray, most: np.ndarray) -> np.ndarr
             break
         top, left = (int((n + 0.5) * SPACING) - half + margin for n in (row, column))
         block = here[top : top + BLOCK, left : left + BLOCK]
-        if block.std() < FLAT:
+        if block.var() < FLAT:
             continue
         rows, columns = (slice(n - reach, n + reach + BLOCK) for n in (top, left))
         fits = []
@@ -185,7 +191,7 @@ def _best_ways(level: Reduced, wanted: np.ndarray, most: np.ndarray) -> np.ndarr
 def _spread(level: Reduced, state: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The state, with the ways of blocks near by where they fit better; where they were tried."""
     width, height = level.size
-    best, state = 1.15 * level.cost(state) + 1, state.copy()
+    best, state = BETTER * level.cost(state) + MORE, state.copy()
     there = ~np.isnan(ways[..., 0])
     area = np.zeros((height, width), bool)
     pad = np.pad(ways, ((2, 2), (2, 2), (0, 0)), constant_values=np.nan)
@@ -210,7 +216,7 @@ def _spread(level: Reduced, state: np.ndarray, ways: np.ndarray) -> tuple[np.nda
     return state, area
 
 
-def refined(level: Reduced, state: np.ndarray, side: int, steps: int = 2) -> np.ndarray:
+def refined(level: Reduced, state: np.ndarray, side: int) -> np.ndarray:
     """A state after steps of inverse search over squares of a side [px], each way by itself."""
     across = _cv().Scharr(level.here, _cv().CV_32F, 1, 0, scale=1 / 32)
     down = _cv().Scharr(level.here, _cv().CV_32F, 0, 1, scale=1 / 32)
@@ -225,11 +231,11 @@ def refined(level: Reduced, state: np.ndarray, side: int, steps: int = 2) -> np.
         way = way_of(state, side_of)
         apart = level.moved(other, way) - level.here
         cost = mean(np.abs(apart))
-        for _ in range(steps):
-            apart = np.clip(apart, -30, 30)
+        for _ in range(int(STEPS)):
+            apart = np.clip(apart, -MOST_STEP_APART, MOST_STEP_APART)
             x, y = mean(across * apart), mean(down * apart)
             step = np.stack([xy * y - yy * x, xy * x - xx * y], axis=2) * scale[..., None]
-            tried = way + np.clip(step, -1, 1)
+            tried = way + np.clip(step, -LONGEST_STEP, LONGEST_STEP)
             other_apart = level.moved(other, tried) - level.here
             other_cost = mean(np.abs(other_apart))
             takes = other_cost < cost

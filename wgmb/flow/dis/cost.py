@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from .blocks import constants
 from .inverse_search import Pictures
 
 LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match, and over which changes of motion are averaged
 AROUND = 25  # px of these a side over which what is compared is averaged
-ROUGH = 2.5  # levels of 255 that the motion's change from a pixel to the next costs, per px,
-MOST_ROUGH = 4.0  # px, beyond which a change costs no more
-MOST_OTHER = 8.0  # levels of 255 that the difference to the neighbour that fits worse may cost
+ROUGH = 2.5  # levels of 255 that the motion's change from a pixel to the next costs, per px
+MOST_ROUGH, MOST_OTHER = constants("compare", "MOST_ROUGH", "MOST_OTHER")
 
 
 def _cv() -> Any:
