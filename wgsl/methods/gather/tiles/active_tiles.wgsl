@@ -32,7 +32,7 @@ const EDGE: f32 = 4.0;          // px by which motion in a tile changes at an ed
 const EDGE_RADIUS: i32 = 2;     // a silhouette takes the motions of pixels up to so far away [px]
 const MARGIN: i32 = 2;          // tiles around a cell that are searched for active ones
 
-/// Once per frame: all tiles that the motions of one tile lead to, and those beside, become active.
+/// Once per frame: all tiles that the motions of one tile lead to, and those beside it, become active.
 @compute @workgroup_size(WG_X, WG_Y)
 fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
         @builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u) {
@@ -54,9 +54,10 @@ fn mark_active_tiles(@builtin(local_invocation_index) local: u32,
     }
     bend = select(vec2f(0.0), MOST_BEND * bend, bend > vec2f(STATIC_EPSILON));
     let box = union_with_origin(displacement_box(least, most, window.x), displacement_box(least, most, window.y)) + vec4f(-bend, bend);
-    let margin = 1.0 + 2.0 / f32(TILE);     // as in sweep_overlaps() of the tile motions
-    let first = max(here + max(vec2i(floor(box.xy / f32(TILE) - margin)), vec2i(-MAX_TILE_RADIUS)), vec2i(0));
-    let last = min(here + min(vec2i(ceil(box.zw / f32(TILE) + margin)), vec2i(MAX_TILE_RADIUS)), tiles - 1);
+    // Those that sweep_overlaps() of the tile motions tells: between these two ends, not at them.
+    let margin = 1.0 + f32(EDGE_RADIUS) / f32(TILE);
+    let first = max(here + max(vec2i(floor(box.xy / f32(TILE) - margin)) + 1, vec2i(-MAX_TILE_RADIUS)), vec2i(0));
+    let last = min(here + min(vec2i(ceil(box.zw / f32(TILE) + margin)) - 1, vec2i(MAX_TILE_RADIUS)), tiles - 1);
     let across = last.x - first.x + 1;
     // It may move and be back when the shutter opens and closes, so only pixels that cannot get away at all are static.
     // Both components together stay under STATIC_EPSILON.
