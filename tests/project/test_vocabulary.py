@@ -96,6 +96,12 @@ def headless(text: str) -> list[str]:
     return [text[m.start() : m.end() + 40] for m in found if not QUESTION.search(text[: m.start()])]
 
 
+def prose(page: str) -> str:
+    """A page of Markdown without its headings and code."""
+    page = re.sub(r"(?ms)^(```|~~~).*?^\1", "", page)
+    return re.sub(r"`[^`]*`|^#.*$", "x", page, flags=re.M)
+
+
 def texts(file: Path) -> Iterator[str]:
     """Docstrings and messages of a file."""
     for node in ast.walk(ast.parse(file.read_text("utf-8"))):
@@ -105,10 +111,14 @@ def texts(file: Path) -> Iterator[str]:
 
 def test_headless_clauses_are_rare():
     """At most 4 in 10,000 words; see HEADLESS."""
-    written = [text for file in sorted(PACKAGE.rglob("*.py")) for text in texts(file)]
-    found = [clause for text in written for clause in headless(text)]
-    words = sum(len(text.split()) for text in written)
-    assert len(found) <= 4e-4 * words, "\n".join(found)
+    root = PACKAGE.parent
+    pages = [*root.glob("*.md"), *(root / "docs").rglob("*.md")]
+    written = [prose(page.read_text("utf-8")) for page in pages]
+    coded = [text for file in sorted(PACKAGE.rglob("*.py")) for text in texts(file)]
+    for all_texts in (written, coded):
+        found = [clause for text in all_texts for clause in headless(text)]
+        words = sum(len(text.split()) for text in all_texts)
+        assert len(found) <= 4e-4 * words, "\n".join(found)
 
 
 def test_questions_are_no_headless_clauses():
