@@ -185,17 +185,16 @@ class Exposures:
 
         `is_coded`: it will be, and pixels may not be finite.
         """
-        begins = True
+        changed: list[Cell] = []
 
         def part(cell: Cell) -> Part:
-            nonlocal begins
             blur = self._blur
             if self._at_edges is not None and frames.has_edges(cell):
                 blur = self._at_edges
             self._used.add(blur.method.name)
             found = frames.in_shot(cell.index, blur)
-            if frames.change(cell, begins):
-                begins = False
+            if frames.change(cell, not changed):
+                changed.append(cell)
             return cell, found, blur
 
         size = shots[cells[0].index].content.coded.size
@@ -203,7 +202,7 @@ class Exposures:
             light = self._sum.alone(part(cells[0]))
         else:
             light = self._sum.texture(size, map(part, cells))
-        return light, None if begins else frames.changing.changes(size)
+        return light, frames.changing.changes(size) if changed else None
 
 
 class VideoBlur(Exposures):
