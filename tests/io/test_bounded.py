@@ -114,3 +114,34 @@ def test_neither_a_frame_nor_a_mask_is_a_pipe(tmp_path, capsys, name, what):
     blur = "blur", pattern, "-o", tmp_path / "o.####.exr", "--method", "tap", "--holdout", path
     code, out, err = make.inside(capsys, *blur)
     assert (code, err.count("\n")) == (2, 1) and name in err
+
+
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        ("clip.mp", "clip.mp4"),
+        ("Clip.MP4", "clip.mp4"),
+        ("clip.mov", "clip.mp4"),  # the video, not the note on it
+        ("cilp.mp4", "clip.mp4"),
+        ("take3.mp4", "take2.mp4"),
+        ("shot.0009.exr", "shot.0003.exr"),
+        ("shot.0002.png", "shot.0002.exr"),
+        ("sot.0002.exr", "shot.0002.exr"),
+        ("0007.png", ""),
+        ("clip.txt.bak", ""),
+        ("other.mp4", ""),
+    ],
+)
+def test_a_file_that_is_not_there_has_a_near_name(tmp_path, asked, meant):
+    for name in ("clip.mp4", "take1.mp4", "take2.mp4", *(f"shot.000{n}.exr" for n in (1, 2, 3))):
+        (tmp_path / name).write_bytes(bytes(500))
+    (tmp_path / "clip.txt").write_bytes(b"note")
+    if (tmp_path / asked).exists():
+        pytest.skip("capitals do not count on this disk")
+    end = f"; did you mean '{tmp_path / meant}'?" if meant else ""
+    assert str(bounded.missing(tmp_path / asked)) == f"{tmp_path / asked}: no such file{end}"
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    text = str(bounded.missing(tmp_path / "no" / "clip.mp4"))
+    assert text.endswith(f"no such file; there is no folder {tmp_path / 'no'}")

@@ -11,6 +11,7 @@ import stat
 from pathlib import Path
 
 from ..errors import InputError
+from .near import near
 
 
 def check(path: Path, most: int, kind: str) -> None:
@@ -39,7 +40,14 @@ def missing(path: Path) -> InputError:
     """The error for a path where a regular file was expected: what is there instead."""
     if path.is_dir():
         return InputError(f"{path}: is a folder, not a file")
-    return InputError(f"{path}: {'is a pipe or a device' if path.exists() else 'no such file'}")
+    if path.exists():
+        return InputError(f"{path}: is a pipe or a device")
+    if not path.parent.is_dir():
+        return InputError(f"{path}: no such file; there is no folder {path.parent}")
+    meant = near(path)
+    return InputError(
+        f"{path}: no such file" + (f"; did you mean '{path.with_name(meant)}'?" if meant else "")
+    )
 
 
 def _without_waiting(path: str, flags: int) -> int:

@@ -12,6 +12,7 @@ from typing import Any
 
 from ...cone import Cone
 from ...errors import InputError, did_you_mean
+from ...files.near import near
 from ...io import frame_numbers, limits
 from ...methods import METHODS
 from ...scene import builtin
@@ -204,8 +205,11 @@ class State(ShownMoment):
         if source not in builtin.SCENES and not (
             frame_numbers.readable(Path(source)) or frame_numbers.is_pattern(source)
         ):
-            known = f"{', '.join(builtin.SCENES)}{did_you_mean(source, builtin.SCENES)}"
-            raise InputError(f"no such file or scene: {source!r}; scenes: {known}")
+            scenes = ", ".join(builtin.SCENES)
+            known = f"scenes: {scenes}{did_you_mean(source, builtin.SCENES)}"
+            meant = near(Path(source))
+            known = f"did you mean {str(Path(source).with_name(meant))!r}?" if meant else known
+            raise InputError(f"no such file or scene: {source!r}; {known}")
         seen = self.unmoved()
         state = replace(
             seen,
