@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from counted import counted
 
 import wgmb
 from twins import moving_light as twin
@@ -533,6 +534,59 @@ def test_light_that_rests_changes_no_bit():
     frame = around(still=True)
     off, on = (Blur("gather", shading=s)(frame) for s in ("off", "passes"))
     np.testing.assert_array_equal(on, off)
+
+
+def still_but_for_noise():
+    """Pixels of noise that differ from frame to frame; on average, light rests."""
+    frames = []
+    for n in range(3):
+        frame, rng = scene(0, pan=(0, 0), still=True), np.random.default_rng(n)
+        light = frame.diffuse_light * np.where(rng.random(SIZE) < 0.01, 1.1, 1)[..., None]
+        frames.append(replace(frame, diffuse_light=light.astype("f4")))
+    return frames[1].between(frames[0], frames[2])
+
+
+LIGHT = {
+    "rests": around(still=True, pan=(0, 0)), "moves on": around(still=True),
+    "noise": still_but_for_noise(), "moves": around(),
+    "fast": around(still=True, pan=(200.0, 0)), "reflections": around(glossy=True),
+    "rests without passes": bare(around(still=True, **AT_REST)),
+    "moves without passes": bare(around(radius=3, **AT_REST)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", LIGHT)
+def test_steps_of_light_that_are_left_out_change_no_bit(kind):
+    """`encode`, which waits for nothing, records all of them."""
+    blur, frame = Blur("gather", samples=8), LIGHT[kind]
+    images = TexturePool(blur.device)
+    output, encoder = (
+        images.texture("output", frame.size, blur.output),
+        blur.device.create_command_encoder(),
+    )
+    blur.encode(encoder, output=output, **blur.upload(frame))
+    want = images.download(encoder, output)[..., : frame.color.shape[2]]
+    for _ in range(3):
+        np.testing.assert_array_equal(blur(frame), want)
+
+
+def test_light_that_rests_takes_few_passes():
+    """All of them are recorded once where light begins to move, and then as long as it moves."""
+    frames, passes = ("rests", "rests", "moves", "moves", "noise", "noise", "rests", "rests"), []
+    blur, off = (Blur("gather", samples=8, shading=shading) for shading in ("passes", "off"))
+    for frame in frames:
+        with counted() as all_passes:
+            blur(LIGHT[frame])
+        with counted() as without:
+            off(LIGHT[frame])
+        passes.append(all_passes["dispatches"] - without["dispatches"])
+    first, rests, begins, moves, ends, noise, calms, again = passes
+    assert first == rests == again <= 12
+    assert moves > 100
+    assert begins > moves + rests
+    assert ends == moves
+    assert rests < noise < 40
+    assert calms == noise
 
 
 def test_moving_surfaces_without_passes_change_no_bit():

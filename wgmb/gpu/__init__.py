@@ -18,6 +18,7 @@ from .device import (
 )
 from .kernels import BufferPart, FrameBindings, Kernel, Pass, kernel, stored, uniform
 from .priority import lower_priority, yielding
+from .tape import Tape, Tapes
 
 __all__ = [
     "SOFTWARE",
@@ -26,6 +27,8 @@ __all__ = [
     "FrameBindings",
     "Kernel",
     "Pass",
+    "Tape",
+    "Tapes",
     "adapters",
     "borrow_device",
     "check_size",

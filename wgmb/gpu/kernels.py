@@ -7,6 +7,7 @@ is where every dispatch of wgmb passes through, as a `Pass` that can be recorded
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
@@ -38,6 +39,18 @@ class FrameBindings:
     window: tuple[int, int, int, int] = (0, 0, 0, 0)  # x, y in the display window, its size [px]
     groups: BindGroups | None = None  # where bind groups are kept; None: each is made anew
 
+    def group(
+        self,
+        device: wgpu.GPUDevice,
+        layout: wgpu.GPUBindGroupLayout,
+        places: Mapping[str, int],
+        resources: Mapping[str, Resource] | None = None,
+    ) -> wgpu.GPUBindGroup:
+        """The group of `layout` that binds resources, by default these, at the indices `places`."""
+        every = self.resources if resources is None else resources
+        make = made_group if self.groups is None else self.groups.group
+        return make(device, layout, {index: every[name] for name, index in places.items()})
+
     @classmethod
     def of_size(cls, device: wgpu.GPUDevice, size: tuple[int, int]) -> FrameBindings:
         """For passes that need no more of a frame than its size [px]."""
@@ -61,8 +74,11 @@ class Pass:
     workgroups: Size | BufferPart
     """Their number across and down; or the part of a buffer that holds it."""
 
-    def record(self, encoder: wgpu.GPUCommandEncoder) -> None:
+    def record(self, encoder: wgpu.GPUCommandEncoder | Recorder) -> None:
         """Record it."""
+        if isinstance(encoder, Recorder):
+            encoder.add(self)
+            return
         pipeline = self.kernel.pipeline(self.entry)
         compute = encoder.begin_compute_pass(label=pipeline.label)
         compute.set_pipeline(pipeline)
@@ -75,6 +91,14 @@ class Pass:
                 self.workgroups["buffer"], self.workgroups["offset"]
             )
         compute.end()
+
+
+class Recorder:
+    """Takes the place of a command encoder, and passes as they are."""
+
+    def add(self, one: Pass) -> None:
+        """Record a pass."""
+        raise NotImplementedError
 
 
 class Kernel:
@@ -99,24 +123,25 @@ class Kernel:
             raise ShaderError(_located(str(error), source)) from None
         self._names = {b.name for b in self.bindings.values() if b.group > 0}
         self.groups = range(1 + max((b.group for b in self.bindings.values()), default=-1))
-        self.layouts = [
-            device.create_bind_group_layout(
-                label=f"{source.name}:{group}",
-                entries=[
-                    _layout_entry(b, source) for b in self.bindings.values() if b.group == group
-                ],
-            )
-            for group in self.groups
-        ]
+        self.layouts = [self._group_layout(group) for group in self.groups]
         self._layout = device.create_pipeline_layout(bind_group_layouts=self.layouts)
         self._structs = {
             b.name: source.dtype(b.type) for b in self.bindings.values() if b.space == "uniform"
         }
         self._pipelines: dict[str, wgpu.GPUComputePipeline] = {}
-        self._places = [
+        self.places = [
             {b.name: b.index for b in self.bindings.values() if b.group == group}
             for group in self.groups
         ]
+
+    def _group_layout(self, group: int) -> wgpu.GPUBindGroupLayout:
+        """The layout of a group; kernels share that of the frame, and with it their groups."""
+        own = [b for b in self.bindings.values() if b.group == group]
+        entries = [_layout_entry(b, self.source) for b in own]
+        if group == 0:
+            return _frame_layout(self.device, json.dumps(entries))
+        label = f"{self.source.name}:{group}"
+        return self.device.create_bind_group_layout(label=label, entries=entries)
 
     def pipeline(self, entry: str) -> wgpu.GPUComputePipeline:
         """The compiled pass of an entry point, made when it is first asked for.
@@ -148,7 +173,7 @@ class Kernel:
 
     def run(
         self,
-        encoder: wgpu.GPUCommandEncoder,
+        encoder: wgpu.GPUCommandEncoder | Recorder,
         entry: str,
         bindings: FrameBindings,
         over: Size | BufferPart | None = None,
@@ -180,10 +205,9 @@ class Kernel:
         every: dict[str, Resource] = dict(bindings.resources)
         for name, value in resources.items():
             every[name] = value if isinstance(value, _MADE) else self._resource(name, value)
-        make = made_group if bindings.groups is None else bindings.groups.group
         groups = tuple(
-            make(self.device, layout, {index: every[name] for name, index in places.items()})
-            for layout, places in zip(self.layouts, self._places, strict=True)
+            bindings.group(self.device, layout, places, every)
+            for layout, places in zip(self.layouts, self.places, strict=True)
         )
         if over is None or isinstance(over, tuple):
             across, down = over or bindings.size
@@ -222,6 +246,11 @@ class Kernel:
 @lru_cache(maxsize=128)
 def _module(device: wgpu.GPUDevice, name: str, text: str) -> wgpu.GPUShaderModule:
     return device.create_shader_module(code=text, label=name)
+
+
+@lru_cache(maxsize=64)
+def _frame_layout(device: wgpu.GPUDevice, entries: str) -> wgpu.GPUBindGroupLayout:
+    return device.create_bind_group_layout(label="frame", entries=json.loads(entries))
 
 
 @lru_cache(maxsize=256)
@@ -286,6 +315,7 @@ def forget_kernels() -> None:
     """Let go of all compiled kernels, and of constants: their device is lost."""
     _kernel.cache_clear()
     _module.cache_clear()
+    _frame_layout.cache_clear()
     forget_constants()
 
 

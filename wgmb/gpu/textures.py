@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ _USAGE = wgpu.TextureUsage
 _NUMPY = {"32float": "<f4", "16float": "<f2", "32uint": "<u4", "16uint": "<u2"}
 _NUMPY |= {"8uint": "u1", "8unorm": "u1"}
 _STORABLE = ("rgba16float", "rgba32float", "r32float", "r32uint", "rg32uint", "rgba32uint")
+Word = tuple[wgpu.GPUBuffer, int]
+"""A word of a buffer that can be copied, by its offset [bytes]."""
 _CHANNELS = {"r": 1, "rg": 2, "rgba": 4, "bgra": 4}
 
 
@@ -141,17 +144,25 @@ class TexturePool:
 
     def download(self, encoder: wgpu.GPUCommandEncoder, texture: wgpu.GPUTexture) -> np.ndarray:
         """Submit `encoder` and return `texture` as a new (height, width, channels) array."""
+        return self.download_with(encoder, texture, ())[0]
+
+    def download_with(
+        self, encoder: wgpu.GPUCommandEncoder, texture: wgpu.GPUTexture, words: Sequence[Word]
+    ) -> tuple[np.ndarray, tuple[int, ...]]:
+        """The same, and words of buffers, with one wait for all."""
         width, height, _ = texture.size
         kind, channels = numpy_of(texture.format)
         row = width * channels * kind.itemsize
         pitch = -(-row // 256) * 256  # rows in a buffer start at multiples of 256 bytes
         picture = np.empty((height, width, channels), kind)
         band = max(1, min(height, self._at_once // pitch))
-        if self._staging is None or self._staging.size != pitch * band:
+        size = pitch * band + 4 * len(words)
+        if self._staging is None or self._staging.size != size:
             usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
-            self._staging = self.device.create_buffer(
-                label="readback", size=pitch * band, usage=usage
-            )
+            self._staging = self.device.create_buffer(label="readback", size=size, usage=usage)
+        for k, (buffer, offset) in enumerate(words):
+            encoder.copy_buffer_to_buffer(buffer, offset, self._staging, pitch * band + 4 * k, 4)
+        told = ()
         for top in range(0, height, band):
             rows = min(band, height - top)
             if top:
@@ -165,8 +176,9 @@ class TexturePool:
             self._staging.map_sync(wgpu.MapMode.READ)
             try:
                 data = np.asarray(self._staging.read_mapped(copy=False)).view(np.uint8)
+                told = tuple(data[pitch * band :].view(np.uint32).tolist())
                 data = data[: pitch * rows].reshape(rows, pitch)[:, :row]
                 picture[top : top + rows] = data.view(kind).reshape(rows, width, channels)
             finally:
                 self._staging.unmap()
-        return picture
+        return picture, told

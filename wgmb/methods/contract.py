@@ -39,6 +39,8 @@ class Inputs:
     """The scene, of methods that draw one."""
     progress: tuple[int, int]
     """Samples done before, samples to do now."""
+    steps: int | None = None
+    """Steps that are recorded, of a method that has `steps`; None: all."""
 
     @property
     def exposed(self) -> tuple[float, float]:
@@ -110,7 +112,11 @@ class Method(Protocol):
     default "along"; `margin(height)`: pixels that it looks at beyond that, in pictures of this
     height [px]; `bend`: how far its paths leave the parabola through three positions, as a share of
     half the acceleration. Where it uses neighbours, `reach`: frames to either side that it takes,
-    by default 1.
+    by default 1. `steps`: its passes may be recorded in as many steps, each of which has no work
+    unless the step before finds some; `finds`: words of buffers, one for each step but the last,
+    that are not 0 if there is work for the next one, in the frame that was recorded last, once it
+    was run. `repeats(inputs)`: True if it records the same commands for inputs that differ in
+    nothing but the number of the frame, so that they need not be recorded again.
     """
 
     name: str

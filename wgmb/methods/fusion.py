@@ -88,6 +88,10 @@ class Fusion:
         self._alphas = options.alpha_front, options.alpha_back
         self._images = TexturePool(device)
 
+    def repeats(self, inputs: Inputs) -> bool:
+        """See `Method`. A camera is written into a constant."""
+        return inputs.frame.camera is None
+
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the Gaussian's two passes, for weights too, and the fusion."""
         camera: Reprojections | None = inputs.frame.camera

@@ -92,6 +92,10 @@ class Reproject:
         self._carries, self._links, self._heads = (ScratchBuffer(device) for _ in range(3))
         self._bends = Bends(device)
 
+    def repeats(self, inputs: Inputs) -> bool:
+        """See `Method`. The published variant reads cameras, and jitter depends on the number."""
+        return self._options.variant != "published" and not inputs.jitter
+
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record three passes a source for several slices, or two for several steps."""
         record = self._published if self._options.variant == "published" else self._slices

@@ -59,6 +59,10 @@ class Tap:
         self._bends = Bends(device)
         self._constants = {"CURVED": options.path != "straight", "PUBLISHED": published}
 
+    def repeats(self, inputs: Inputs) -> bool:
+        """See `Method`."""
+        return True
+
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record the one pass, after that for the paths through five positions."""
         five = self._is_five and len(inputs.frames) > 1

@@ -67,6 +67,10 @@ class Tiles:
         """A tile is looked up as far as a quarter of its edge away, so that no seams show."""
         return -(-edge_of(height) // 4)
 
+    def repeats(self, inputs: Inputs) -> bool:
+        """See `Method`."""
+        return True
+
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record three passes over the tiles between two over the picture."""
         kernel = gpu.kernel(

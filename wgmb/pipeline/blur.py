@@ -18,7 +18,8 @@ from ..camera import Window
 from ..errors import InputError
 from ..extent import Extent
 from ..frame import Floats, Frame, PassKeywords
-from ..gpu.textures import TexturePool, copy_middle
+from ..gpu import wgsl
+from ..gpu.textures import TexturePool, Word, copy_middle
 from ..gpu.timing import Clock
 from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
 from ..gpu_frame.preparation import Preparation
@@ -45,6 +46,8 @@ from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter, Weight
 from .arguments import checked, method_of, most_samples, shutter_of
 from .panorama import PanoramaCanvas, shortest
+
+_NOISES = wgsl.load("common/noise.wgsl").integer("NOISES")
 
 
 class Blur:
@@ -117,6 +120,9 @@ class Blur:
         self._linear = self.device.create_sampler(mag_filter="linear", min_filter="linear")
         self._velocity = VelocityPass(self.device)
         self._prepared = Preparation(self._images, self._velocity, max_blur is not None)
+        self._steps: int | None = 1
+        self._finds: tuple[Word, ...] = ()
+        self._tapes = gpu.Tapes()
         self.shutter = shutter_of(shutter, curve)
 
     def __repr__(self) -> str:
@@ -189,6 +195,26 @@ class Blur:
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
         passes at once instead of recording them.
         """
+        views = {"prev": prev, "next": next, "prev_prev": prev_prev, "next_next": next_next}
+        more = {"confidence": confidence, "number": number, "timing": timing}
+        self._encode(encoder, frame, output, **more, **views)
+
+    def _encode(
+        self,
+        encoder: wgpu.GPUCommandEncoder,
+        frame: FrameViews,
+        output: View,
+        *,
+        confidence: View | None = None,
+        number: int = 0,
+        timing: Clock | None = None,
+        steps: int | None = None,
+        prev: FrameViews | None = None,
+        next: FrameViews | None = None,
+        prev_prev: FrameViews | None = None,
+        next_next: FrameViews | None = None,
+    ) -> None:
+        """`encode` with the first `steps` of the method; None: all."""
         size, output, confidence = frame.size, view_of(output), view_of(confidence)
         around = {"": (0, frame)}
         near = {"prev.": (-1, prev), "next.": (1, next)}
@@ -203,10 +229,10 @@ class Blur:
         for whose, (_, one) in around.items():
             one.check_fit(self.device, size, whose)
             self._require(one.has, whose)
-        bindings = self.frame_bindings(size, number, frame.window)
+        bindings = self.frame_bindings(size, number % _NOISES, frame.window)
         encoder = timing.watch(encoder) if timing else encoder
         frames = self._prepared.frames(encoder, bindings, list(around.values()))
-        inputs = self._inputs(bindings, number, frames=frames)
+        inputs = self._inputs(bindings, number, frames=frames, steps=steps)
         # Without holdouts the method writes the output itself; else they are put back into it.
         if inputs.frame.weight is None:
             self._record(encoder, inputs, output, confidence)
@@ -249,6 +275,7 @@ class Blur:
         frames: tuple[PreparedFrame, ...] = (),
         scene: SceneOnGpu | None = None,
         progress: tuple[int, int] | None = None,
+        steps: int | None = None,
     ) -> Inputs:
         return Inputs(
             bindings=bindings,
@@ -262,6 +289,7 @@ class Blur:
             auto=self.auto,
             drawn=scene,
             progress=progress or (0, self.samples),
+            steps=steps,
         )
 
     def _record(
@@ -271,9 +299,29 @@ class Blur:
         output: View,
         confidence: View | None = None,
     ):
-        self.method.encode(encoder, inputs, output)
+        self._finds = self._record_method(encoder, inputs, output)
         if confidence is not None and self.confidence:
             self._judge.encode(encoder, inputs, confidence)
+
+    def _record_method(
+        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View
+    ) -> tuple[Word, ...]:
+        """Record the method's passes, or play those of a frame that was as this one; its `finds`.
+
+        Encoders that take the time of passes get each pass by itself.
+        """
+        repeats = getattr(self.method, "repeats", None)
+        plain = isinstance(encoder, wgpu.GPUCommandEncoder)
+        if not (plain and repeats is not None and repeats(inputs)):
+            self.method.encode(encoder, inputs, output)
+            return getattr(self.method, "finds", ())
+
+        def record(tape: Any) -> None:
+            self.method.encode(tape, inputs, output)
+            tape.finds = getattr(self.method, "finds", ())
+
+        key, views = _tape_key(inputs)
+        return self._tapes.play(encoder, inputs.bindings, key, (*views, output), record).finds
 
     def __call__(
         self, color: Floats | Frame, to_next: Floats | None = None, **passes: Unpack[PassKeywords]
@@ -287,11 +335,24 @@ class Blur:
         frame = color if isinstance(color, Frame) else Frame(color, to_next, **passes)
         self._require(frame.has)
         with self._working(frame.size):
-            output = self._images.texture("output", frame.size, self.output)
-            encoder = self.device.create_command_encoder(label="wgmb")
-            self._encode_arrays(encoder, frame, {"output": output})
-            picture = self._images.download(encoder, output)
+            picture = self._picture(frame)
         return picture[..., : frame.color.shape[2]].astype("f4", copy=False)
+
+    def _picture(self, frame: Frame) -> NDArray[np.floating]:
+        """The blurred frame, by as many steps of the method as the frame before needed.
+
+        If one that was left out has work, the frame is blurred once more with all.
+        """
+        output = self._images.view("output", frame.size, self.output)
+        while True:
+            encoder = self.device.create_command_encoder(label="wgmb")
+            done = self._steps
+            self._encode_arrays(encoder, frame, {"output": output}, steps=done)
+            picture, words = self._images.download_with(encoder, output.texture, self._finds)
+            self._steps = 1 + max((k for k, word in enumerate(words, 1) if word), default=0)
+            if done is None or self._steps <= done:
+                return picture
+            self._steps = None
 
     def draw(self, frame: Frame, output: View, timing: Clock | None = None) -> None:
         """Submit the blur of a frame into `output`, without waiting; all as for `encode`.
@@ -301,29 +362,29 @@ class Blur:
         self._require(frame.has)
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb")
-            self._encode_arrays(encoder, frame, {"output": view_of(output).texture}, timing)
+            self._encode_arrays(encoder, frame, {"output": view_of(output)}, timing)
             gpu.submit(self.device, encoder)
 
     def _encode_arrays(
         self,
         encoder: wgpu.GPUCommandEncoder,
         frame: Frame,
-        outputs: dict[str, wgpu.GPUTexture],
+        outputs: dict[str, View],
         timing: Clock | None = None,
+        steps: int | None = None,
     ) -> None:
         """Record the blur of a frame of arrays into its outputs, as `encode` calls them."""
         laid = self._laid(frame)
         wide = {
-            name: texture
+            name: view
             if laid is frame
-            else self._images.texture(f"wide {name}", laid.size, self.output)
-            for name, texture in outputs.items()
+            else self._images.view(f"wide {name}", laid.size, self.output)
+            for name, view in outputs.items()
         }
-        views = {name: texture.create_view() for name, texture in wide.items()}
-        self.encode(encoder, timing=timing, **views, **self._views(laid))
+        self._encode(encoder, timing=timing, steps=steps, **wide, **self._views(laid))
         if laid is not frame:
-            for name, texture in outputs.items():
-                copy_middle(encoder, wide[name], texture)
+            for name, view in outputs.items():
+                copy_middle(encoder, wide[name].texture, view.texture)
 
     def _laid(self, frame: Frame) -> Frame:
         """The frame; a panorama with room beyond its edges."""
@@ -343,12 +404,12 @@ class Blur:
         self._require(frame.has)
         size, channels = frame.size, frame.color.shape[2]
         with self._working(size):
-            output = self._images.texture("output", size, self.output)
-            sure = self._images.texture("confidence", size, self.output)
+            output = self._images.view("output", size, self.output)
+            sure = self._images.view("confidence", size, self.output)
             encoder = self.device.create_command_encoder(label="wgmb")
             self._encode_arrays(encoder, frame, {"output": output, "confidence": sure})
-            picture = self._images.download(encoder, output)[..., :channels]
-            told = self._images.download(self.device.create_command_encoder(), sure)
+            picture = self._images.download(encoder, output.texture)[..., :channels]
+            told = self._images.download(self.device.create_command_encoder(), sure.texture)
         planes = np.moveaxis(told.astype("f4", copy=False), 2, 0)
         return picture.astype("f4", copy=False), dict(zip(names, planes, strict=True))
 
@@ -358,11 +419,11 @@ class Blur:
             raise InputError("no motion: pass to_next, to_prev, or depth and a camera")
         with self._working(frame.size):
             encoder = self.device.create_command_encoder(label="wgmb motion")
-            motion = self._images.texture("motion", frame.size, "rgba32float")
             frame = shortest(frame) if frame.wrap == "on" else frame
+            motion = self._images.view("motion", frame.size, "rgba32float")
             views = self._residency.views_of({0: frame})[0]
-            self.encode_motion(encoder, views, motion.create_view(), frame.number)
-            return self._images.download(encoder, motion)
+            self.encode_motion(encoder, views, motion, frame.number)
+            return self._images.download(encoder, motion.texture)
 
     def encode_motion(
         self, encoder: wgpu.GPUCommandEncoder, frame: FrameViews, output: View, number: int = 0
@@ -410,6 +471,21 @@ class Blur:
     ) -> gpu.FrameBindings:
         """Return the bindings shared by all passes: frame, shutter, times of the samples."""
         return self._constants.bindings(size, number, window)
+
+
+def _tape_key(inputs: Inputs) -> tuple[object, list[View]]:
+    """All that a method that `repeats` depends on: values, and views of textures.
+
+    What a shutter is, its constants hold.
+    """
+    shutter = [inputs.bindings.resources[name].uid for name in ("shutter", "strata")]
+    key: list[object] = [inputs.bindings.size, inputs.bindings.window, *shutter, inputs.steps]
+    views: list[View] = []
+    for frame in inputs.frames:
+        textures = {name: one for name, one in vars(frame).items() if isinstance(one, View)}
+        key.append((frame.offset, frame.by_camera, *textures))
+        views += textures.values()
+    return tuple(key), views
 
 
 def uploaded(frame: Frame, method: Method, residency: Residency) -> dict[str, Any]:

@@ -97,22 +97,22 @@ class ExposureSum:
         if "motion" not in sharp.has or cell.shutter.degrees <= 0:
             return self._sharp(name, sharp)
         blur.shutter = cell.shutter
-        texture = self._images.texture(name, sharp.size, blur.output)
+        view = self._images.view(name, sharp.size, blur.output)
         if isinstance(frame, Frame):
-            blur.draw(frame, texture.create_view(), timing)
-            return texture
+            blur.draw(frame, view, timing)
+            return view.texture
         encoder = self._device.create_command_encoder(label="cell")
         blur.encode(
             encoder,
             frame.frame,
-            texture.create_view(),
+            view,
             prev=frame.prev,
             next=frame.next,
             number=frame.number,
             timing=timing,
         )
         gpu.submit(self._device, encoder)
-        return texture
+        return view.texture
 
     def _sharp(self, name: str, frame: FrameViews | Frame) -> wgpu.GPUTexture:
         if isinstance(frame, FrameViews):

@@ -8,14 +8,14 @@ from typing import Annotated, ClassVar, Literal
 import wgpu
 
 from ...gpu import wgsl
-from ...gpu.textures import TexturePool
+from ...gpu.textures import TexturePool, Word
 from ..contract import Inputs, View
 from ..options import MethodOptions, Range
 from ..tap import Tap
 from .layers.layers import Layers
 from .light_inputs import PASSES, Shading, kinds_of
 from .search import Search
-from .shading import LightTimes, MovingLight
+from .shading import FOLLOWED, LightTimes, MovingLight
 from .tiles.active_tiles import ActiveTiles
 from .tiles.scatter import Scatter
 from .tiles.tile_motions import TileMotions
@@ -65,6 +65,7 @@ class Gather:
     adaptive = True
     quick: ClassVar = {"shading": "off"}
     most_in_software = 512  # loops end there after 65,535 turns, all of a pixel together
+    steps = FOLLOWED
     bend = float(wgsl.load("common/path.wgsl").constant("MOST_BEND"))
     confidence = ("accepted", "disocclusion", "residual", "left")
 
@@ -106,6 +107,15 @@ class Gather:
         self._motions, self._scatter = TileMotions(device, images), Scatter(device)
         self._search = Search(device, images, confidence=confidence, output=output)
 
+    @property
+    def finds(self) -> tuple[Word, ...]:
+        """Of the steps of light, see `Method`."""
+        return self._light.finds
+
+    def repeats(self, inputs: Inputs) -> bool:
+        """See `Method`."""
+        return True
+
     def encode(self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View) -> None:
         """Record layers and tile motions of every frame, then the search."""
         size, frames = inputs.bindings.size, inputs.frames
@@ -123,11 +133,12 @@ class Gather:
             self._motions.encode(encoder, inputs, i, surface, worklists, tiles)
             self._scatter.encode(encoder, inputs, i, (own, surface), candidates, tiles, scattered)
         textures = self._layers.textures
-        added = None
+        added, self._light.finds = None, ()
         if kinds := kinds_of(inputs, self._shading):
             opens, closes = inputs.exposed
             times = LightTimes.within(opens, closes, inputs.samples)
-            added = self._light.encode(encoder, inputs.bindings, kinds, times, inputs.frame.weight)
+            weight, steps = inputs.frame.weight, inputs.steps or self.steps
+            added = self._light.encode(encoder, inputs.bindings, kinds, times, weight, steps)
         starts = candidates, scattered
         if self._taps is not None:
             worklists = {name: one for name, one in worklists.items() if name != "static"}

@@ -2,10 +2,11 @@
 
 from .changes import SurfaceLight
 from .light import (
+    FOLLOWED,
     Added,
     Kind,
     LightTimes,
     MovingLight,
 )
 
-__all__ = ["Added", "Kind", "LightTimes", "MovingLight", "SurfaceLight"]
+__all__ = ["FOLLOWED", "Added", "Kind", "LightTimes", "MovingLight", "SurfaceLight"]

@@ -12,7 +12,7 @@ import wgpu
 
 from .... import gpu
 from ....gpu import wgsl
-from ....gpu.textures import ScratchBuffer, TexturePool
+from ....gpu.textures import ScratchBuffer, TexturePool, Word
 from .changes import SurfaceLight, View, changes, reduced, screen
 from .flow import (
     LightFlow,
@@ -25,9 +25,13 @@ from .stage import FOLDER, GATES_SIZE, Stage
 from .values import values
 
 _LISTS = "doubtful", "changing", "beside", "near", "whole"  # of tiles: see near.wgsl
+_COUNT = 4 * wgsl.load(f"{FOLDER}/active.wgsl").integer("LISTED")  # byte of a list's number
 LONGEST = 480  # px of light along the longer side of an image, on static surfaces, at most
 LEAST_NODES, MOST_NODES = 4, 8  # times of an exposure at which light is known,
 NODES_PER_INTERVAL = 12  # as many in a frame interval within these bounds
+SCREENED, MEASURED, FOLLOWED = 1, 2, 3
+"""Steps of the passes: tiles are screened, changes are measured in those where light may differ,
+and light is followed where it changes. Without an earlier step's finds, the next has no work."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,9 @@ class MovingLight:
         self._confidence = confidence
         self._pushed = {name: ScratchBuffer(device) for name in ("from_here", "from_there")}
         self._kept = {name: ScratchBuffer(device) for name in ("change flags", "gates", *_LISTS)}
+        self.finds: tuple[Word, ...] = ()
+        """Of the frame that was recorded last, once it was run: the word `k` is not 0 if what step
+        `k + 1` found is work for the next one."""
 
     def encode(
         self,
@@ -106,8 +113,12 @@ class MovingLight:
         kinds: Sequence[Kind],
         times: LightTimes,
         weight: View | None,
-    ) -> Added:
-        """Record all passes. `weight`: of every pixel (see PreparedFrame)."""
+        steps: int = FOLLOWED,
+    ) -> Added | None:
+        """Record the passes of the first `steps`; None if light is not followed.
+
+        `weight`: of every pixel (see PreparedFrame).
+        """
         resting = kinds[0].resting
         scale = scale_of(bindings.size) if resting else 1
         if resting:
@@ -125,6 +136,7 @@ class MovingLight:
         for buffer in kept.values():
             encoder.clear_buffer(buffer)
         change_flags, gates = kept.pop("change flags"), kept.pop("gates")
+        self.finds = (kept["doubtful"], _COUNT), (change_flags, 0)
         begun: set[str] = set()
         stages = [
             Stage(
@@ -146,6 +158,8 @@ class MovingLight:
         for stage, kind in zip(stages, kinds, strict=True):
             screen(stage, kind.frames, scale)
         whole.run("near", "list_doubtful", size=grid, **kept)
+        if steps == SCREENED:
+            return None
         whole.run("near", "size_doubtful", size=(1, 1), **kept)
         # There the change to each neighbour is measured, and the tiles with one are listed.
         if resting:
@@ -154,6 +168,8 @@ class MovingLight:
             changes(stage, kind.frames, kind.albedo, kind.by_color)
             for stage, kind in zip(stages, kinds, strict=True)
         ]
+        if steps == MEASURED:
+            return None
         whole.run("near", "main", size=grid, **kept)
         whole.run("near", "size_lists", size=(1, 1), **kept)
         # Around these, light is followed to the times of the nodes; nowhere, if none changes.

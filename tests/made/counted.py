@@ -1,0 +1,54 @@
+"""Count what is asked of wgpu: passes, submits, waits, and what is made."""
+
+from collections import Counter
+from contextlib import contextmanager
+
+import pytest
+import wgpu
+from wgpu.backends.wgpu_native import _api
+
+from wgmb.gpu import Tape
+
+KINDS = {
+    "dispatches": [
+        (_api.GPUComputePassEncoder, "dispatch_workgroups"),
+        (_api.GPUComputePassEncoder, "dispatch_workgroups_indirect"),
+    ],
+    "passes": [(_api.GPUCommandEncoder, "begin_compute_pass")],
+    "submits": [(_api.GPUQueue, "submit")],
+    "waits": [(_api.GPUBuffer, "map_sync"), (_api.GPUQueue, "on_submitted_work_done_sync")],
+    "groups": [(wgpu.GPUDevice, "create_bind_group")],
+    "buffers": [(wgpu.GPUDevice, "create_buffer"), (wgpu.GPUDevice, "create_buffer_with_data")],
+    "textures": [(wgpu.GPUDevice, "create_texture")],
+    "views": [(_api.GPUTexture, "create_view")],
+}
+
+
+@contextmanager
+def counted():
+    """A Counter of the calls within, by the names of KINDS."""
+    counts = Counter()
+
+    def count(kind, method):
+        def called(self, *args, **options):
+            counts[kind] += 1
+            return method(self, *args, **options)
+
+        return called
+
+    with pytest.MonkeyPatch.context() as patch:
+        for kind, methods in KINDS.items():
+            for owner, name in methods:
+                owner = next(
+                    c for c in (*owner.__subclasses__(), *owner.__mro__) if name in vars(c)
+                )
+                patch.setattr(owner, name, count(kind, getattr(owner, name)))
+
+        def played(self, *args):
+            counts["dispatches"] += self.dispatches
+            counts["passes"] += self.passes
+            return play(self, *args)
+
+        play = Tape.play
+        patch.setattr(Tape, "play", played)
+        yield counts
