@@ -1,7 +1,10 @@
 """Frames on which a motion depends: as far as `reach` tells."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
+from counted import counted
 
 from wgmb.flow import Flow
 from wgmb.sequence.flow_motion import FAR
@@ -34,6 +37,24 @@ def farthest(source, width, light):
 def test_best_looks_farther_with_every_level(width):
     flow = Flow()
     assert farthest(flow, width, True) == flow.reach((width, HEIGHT))
+
+
+def test_pictures_of_many_levels_are_measured_once():
+    """And after the first frames no texture is made."""
+    width, loaded = 960, Counter()
+    flow = Flow(quality="fast")
+    assert flow.reach((width, HEIGHT)) == 5
+
+    def load(number):
+        loaded[number] += 0 <= number < COUNT
+        return grey(width, number)[..., None].repeat(3, 2) / np.float32(255)
+
+    shot = flow.shot(load)
+    for number in range(5, 12):
+        with counted() as counts:
+            assert shot.textures(number) is not None
+    assert loaded.most_common(1)[0][1] == 1
+    assert counts["textures"] == 0
 
 
 def test_a_job_watches_as_many_files_as_motion_depends_on():

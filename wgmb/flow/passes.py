@@ -94,8 +94,8 @@ class FlowPasses:
             self._free.setdefault(((width, height), kind), []).append(texture)
 
     def scratch(self, size: tuple[int, int], format: str, name: str) -> wgpu.GPUTexture:
-        """A texture for one stage; the next one that asks for this name gets the same."""
-        texture = self.images.texture(name, size, format)
+        """A texture for one stage; the next one that asks for this name and size gets the same."""
+        texture = self.images.texture(f"{name} {size[0]} x {size[1]}", size, format)
         self._lent.add(texture.uid)
         return texture
 

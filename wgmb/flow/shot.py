@@ -76,9 +76,8 @@ EFFORTS = {
     "draft": Effort(3, 2, 0, 1, block=4, aside=0.15, led=1, longest=440),
 }
 LARGEST = 4  # px across a light on the coarsest level: what is larger, the search finds
+BEHIND = 2  # pictures that are kept before the frame asked for; after it, all that it looks at
 KEPT = {
-    "pictures": 4,
-    "display": 4,
     "lights": 2,
     "most": 1,
     "guides": 1,
@@ -337,7 +336,11 @@ class Shot:
         """Release data that the frames after and before this one will not need."""
         for key in list(self._results):
             stage, other, level = key
-            if abs(other - number) > KEPT[stage] + level:
+            if stage in ("pictures", "display"):
+                far = not -BEHIND <= other - number <= 1 + len(self._sizes)
+            else:
+                far = abs(other - number) > KEPT[stage] + level
+            if far:
                 made = self._results.pop(key)
                 textures = made if isinstance(made, list | tuple) else [made]
                 if isinstance(made, Motion):
