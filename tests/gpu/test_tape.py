@@ -87,12 +87,10 @@ def test_a_tape_ends_with_what_it_depends_on():
         (Shutter(180, curve="triangle"), between()), (180, between(size=(40, 30))),
         (Shutter(180, "start"), between()), (180, between(size=(64, 48))), (180, between()),
     ]  # fmt: skip
-    for _ in range(2):
-        for shutter, one in cases:
-            blur.shutter = shutter
-            np.testing.assert_array_equal(
-                blur(one), Blur("gather", shutter=shutter, samples=4)(one)
-            )
+    wants = [Blur("gather", shutter=shutter, samples=4)(one) for shutter, one in cases]
+    for (shutter, one), want in 2 * list(zip(cases, wants, strict=True)):
+        blur.shutter = shutter
+        np.testing.assert_array_equal(blur(one), want)
     assert len(blur._tapes) <= 8
 
 

@@ -1,9 +1,9 @@
 """Count what is asked of wgpu: passes, submits, waits, and what is made."""
 
 from collections import Counter
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from unittest.mock import patch
 
-import pytest
 import wgpu
 from wgpu.backends.wgpu_native import _api
 
@@ -36,13 +36,13 @@ def counted():
 
         return called
 
-    with pytest.MonkeyPatch.context() as patch:
+    with ExitStack() as patches:
         for kind, methods in KINDS.items():
             for owner, name in methods:
                 owner = next(
                     c for c in (*owner.__subclasses__(), *owner.__mro__) if name in vars(c)
                 )
-                patch.setattr(owner, name, count(kind, getattr(owner, name)))
+                patches.enter_context(patch.object(owner, name, count(kind, getattr(owner, name))))
 
         def played(self, *args):
             counts["dispatches"] += self.dispatches
@@ -50,5 +50,5 @@ def counted():
             return play(self, *args)
 
         play = Tape.play
-        patch.setattr(Tape, "play", played)
+        patches.enter_context(patch.object(Tape, "play", played))
         yield counts

@@ -195,9 +195,9 @@ class Blur:
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
         passes at once instead of recording them.
         """
-        views = {"prev": prev, "next": next, "prev_prev": prev_prev, "next_next": next_next}
-        more = {"confidence": confidence, "number": number, "timing": timing}
-        self._encode(encoder, frame, output, **more, **views)
+        around = {"prev": prev, "next": next, "prev_prev": prev_prev, "next_next": next_next}
+        self._encode(encoder, frame, output, confidence=confidence, number=number, timing=timing,
+                     **around)  # fmt: skip
 
     def _encode(
         self,
