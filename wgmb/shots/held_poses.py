@@ -30,7 +30,8 @@ def may_be_held(motion: np.ndarray) -> bool:
     """Return True if vectors (height, width, 4) of a few pixels lead far to one side only."""
     few = motion[::_STEP, ::_STEP]
     with np.errstate(all="ignore"):
-        return bool((_leads_far(few, -1) | _leads_far(few, 1)).any())
+        most = motion.shape[1] / 2
+        return bool((_leads_far(few, -1, most) | _leads_far(few, 1, most)).any())
 
 
 def without_jumps(frame: Frame) -> Frame:
@@ -71,17 +72,21 @@ def _sides(motion: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
     return (back, ahead) if side < 0 else (ahead, back)
 
 
-def _leads_far(motion: np.ndarray, side: int) -> np.ndarray:
-    """A mask of the vectors that lead far to one side, and hardly anywhere to the other."""
+def _leads_far(motion: np.ndarray, side: int, most: float) -> np.ndarray:
+    """A mask of the vectors that lead far to one side, and hardly anywhere to the other.
+
+    From `most` on [px], half the width, they lead around a panorama.
+    """
     jump, hold = _sides(motion, side)
     apart2 = ((jump + hold) ** 2).sum(axis=-1)
-    return (apart2 > _JUMP**2) & ((hold**2).sum(axis=-1) < _CALM**2 * apart2)
+    near = (apart2 > _JUMP**2) & (apart2 < most**2)
+    return near & ((hold**2).sum(axis=-1) < _CALM**2 * apart2)
 
 
 def _jumps(motion: np.ndarray, near: np.ndarray, side: int) -> np.ndarray:
     """A mask of the vectors to one side that are a jump; `near` are the neighbour's."""
     with np.errstate(all="ignore"):
-        y, x = np.nonzero(_leads_far(motion, side))
+        y, x = np.nonzero(_leads_far(motion, side, motion.shape[1] / 2))
         jump, hold = (vectors[y, x] for vectors in _sides(motion, side))
         at = np.stack([x, y], axis=-1) + 0.5 + jump
         inside = ((at >= 0) & (at < near.shape[1::-1])).all(axis=-1)
