@@ -203,6 +203,7 @@ def test_for_a_worker_that_is_lost_at_its_start_another_one_comes(monkeypatch):
     wait = local._wait_for
 
     def lost(cluster, client, count):
+        client.wait_for_workers(1, timeout=60)
         cluster.sync(cluster.workers[0].close)
         wait(cluster, client, count)
 
