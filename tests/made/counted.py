@@ -1,7 +1,9 @@
 """Count what is asked of wgpu: passes, submits, waits, and what is made."""
 
 from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from typing import Any
 from unittest.mock import patch
 
 import wgpu
@@ -25,12 +27,12 @@ KINDS = {
 
 
 @contextmanager
-def counted():
+def counted() -> Iterator[Counter[str]]:
     """A Counter of the calls within, by the names of KINDS."""
-    counts = Counter()
+    counts: Counter[str] = Counter()
 
-    def count(kind, method):
-        def called(self, *args, **options):
+    def count(kind: str, method: Callable[..., Any]) -> Callable[..., Any]:
+        def called(self: Any, *args: Any, **options: Any) -> Any:
             counts[kind] += 1
             return method(self, *args, **options)
 
@@ -44,7 +46,7 @@ def counted():
                 )
                 patches.enter_context(patch.object(owner, name, count(kind, getattr(owner, name))))
 
-        def played(self, *args):
+        def played(self: Tape, *args: Any) -> None:
             counts["dispatches"] += self.dispatches
             counts["passes"] += self.passes
             return play(self, *args)

@@ -195,9 +195,18 @@ class Blur:
         `timing` takes the time of every pass: `timing.clock(device)`, whose WallClock runs the
         passes at once instead of recording them.
         """
-        around = {"prev": prev, "next": next, "prev_prev": prev_prev, "next_next": next_next}
-        self._encode(encoder, frame, output, confidence=confidence, number=number, timing=timing,
-                     **around)  # fmt: skip
+        self._encode(
+            encoder,
+            frame,
+            output,
+            prev=prev,
+            next=next,
+            prev_prev=prev_prev,
+            next_next=next_next,
+            confidence=confidence,
+            number=number,
+            timing=timing,
+        )
 
     def _encode(
         self,
