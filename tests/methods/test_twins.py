@@ -208,7 +208,7 @@ def test_reproject_is_its_twin(size, neighbours, mixing):
 @pytest.mark.covers(0)
 @pytest.mark.parametrize(
     "variant, depths, speed",
-    [("even", True, 6.0), ("even", False, 60.0), ("published", True, 60.0)],
+    [("even", True, 6.0), ("even", True, 60.0), ("even", False, 20.0), ("published", True, 60.0)],
 )
 def test_tiles_is_its_twin(variant, depths, speed, mixing):
     """Taps that land on a texel's edge may read the next one; all other pixels agree."""

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from twins.tap import bilinear, displacement
+from twins.tap import bilinear, displacement, source
 
-KAPPA, GAMMA, SHORT, FAR = 40.0, 1.5, 0.5, 1e10
+KAPPA, GAMMA, SHORT, FAR, NEAR = 40.0, 1.5, 0.5, 1e10, 1.0
 
 
 def tiles(color, motion, depth, times, span, noise, edge, published=False, weight=None):
@@ -21,6 +21,9 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     out = np.zeros(color.shape)
     for y, x in np.ndindex(height, width):
         tile = _tile(x, y, noise[y, x], edge, dominant.shape)
+        if depth is None and not published:
+            out[y, x] = _passing(color, motion, times, span, dominant[tile], weight, y, x)
+            continue
         fast = _held(dominant[tile], span, edge)
         reach = max(_streak(fast, span), SHORT)
         if reach <= SHORT:
@@ -49,6 +52,34 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
             counted += w / len(times) * (1 if weight is None else bilinear(weight, *at))
         out[y, x] = total / counted if counted > 0 else _own(color, weight, y, x)
     return out
+
+
+def _passing(color, motion, times, span, fast, weight, y, x):
+    """The pixel's own path, but what moves farther when it passes."""
+    if _streak(fast, span) <= SHORT:
+        return _own(color, weight, y, x)
+    height, width = color.shape[:2]
+    here, own, total, counted = np.array([x + 0.5, y + 0.5]), _velocity(motion[y, x]), 0.0, 0.0
+    for t in times:
+        at = here + source(motion, y, x, t)
+        offset = displacement(fast, t)
+        column = int(_within(np.floor((here - offset)[0]), 0, width - 1))
+        row = int(_within(np.floor((here - offset)[1]), 0, height - 1))
+        other = _velocity(motion[row, column])
+        speed = np.hypot(*other)
+        is_faster = speed > np.hypot(*own) + 0.5
+        is_faster &= np.hypot(*(other - own)) > max(1.0, 0.25 * speed)
+        if is_faster and np.hypot(*(displacement(motion[row, column], t) - offset)) < NEAR:
+            at = here - offset
+        total = total + bilinear(color, *at) / len(times)
+        counted += (1 if weight is None else bilinear(weight, *at)) / len(times)
+    if counted <= 0:
+        return _own(color, weight, y, x)
+    return total if weight is None else total / counted
+
+
+def _velocity(motion):
+    return (motion[2:] - motion[:2]) / 2
 
 
 def followed(motion, span, edge):

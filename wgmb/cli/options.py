@@ -112,7 +112,7 @@ class FrameBlurOptions(BlurOptions):
         str | None,
         Parameter(
             help=f"{', '.join(_FRAME_METHODS)}; default: gather with depth or searched motion, "
-            "else tap.",
+            "else tiles.",
             group=MAIN,
         ),
     ] = None

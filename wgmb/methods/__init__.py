@@ -46,5 +46,5 @@ def check_takes_frames(method: type[Method]) -> None:
 
 
 def default_method(has: Collection[str]) -> MethodName:
-    """Return the default method for these inputs: gather if they suffice, else tap."""
-    return "gather" if Gather.needs <= {"color", *has} else "tap"
+    """Return the default method for these inputs: gather if they suffice, else tiles."""
+    return "gather" if Gather.needs <= {"color", *has} else "tiles"

@@ -30,8 +30,10 @@ class Tiles:
     holds; a streak reaches at most a tile to either side: 40 px, or a ninth of the height.
     `variant`: "even" divides every weight by its value under uniform motion, so that there a
     streak is as even as the exposure; "published" takes them as printed, which makes streaks
-    brightest in their middle. Without depth, everything is equally near. `show`: "tiles" gives
-    the motion that each tile follows: hue is its direction, full brightness a whole tile.
+    brightest in their middle. Without depth, a pixel follows its own path, but has the colour of a
+    surface that moves farther at the times at which that one passes; published: everything is
+    equally near. `show`: "tiles" gives the motion that each tile follows: hue is its direction,
+    full brightness a whole tile.
 
     Strong: one frame is enough, fast, soft at silhouettes. Artefacts: where two motions meet
     only one of them is followed, hidden surfaces are guessed from neighbouring pixels.
@@ -81,6 +83,7 @@ class Tiles:
             ADAPTIVE=inputs.auto,
             WEIGHTED=inputs.frame.weight is not None,
             PUBLISHED=self._options.variant == "published",
+            HAS_DEPTH=inputs.frame.depth is not None,
             TILES=self._options.show == "tiles",
         )
         velocity = gpu.kernel(

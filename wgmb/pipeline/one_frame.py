@@ -35,7 +35,7 @@ def blur(
 ) -> NDArray[np.float32]:
     """Blur one frame: linear colour in, linear colour out, motion in pixels per frame.
 
-    `method`: as for Blur; by default gather if depth is available, else tap. `more`: the
+    `method`: as for Blur; by default gather if depth is available, else tiles. `more`: the
     passes of Frame (to_prev, depth, camera, holdout, ...) and the options of Blur (jitter,
     max_blur, device, and those of the method).
     """

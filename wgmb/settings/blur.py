@@ -69,7 +69,7 @@ class BlurSettings:
     """Blur method and options; the fields of METHOD_OPTIONS are added."""
 
     method: str | None = None
-    "Blur method; by default gather with depth or searched motion, else tap."
+    "Blur method; by default gather with depth or searched motion, else tiles."
     samples: int | Literal["auto"] | None = None
     """Samples per pixel: 16 by default (fusion: 8). auto, the default for videos: as many as the
     blur is long, at most 64.

@@ -1,6 +1,7 @@
 // Reconstruction filter over tiles (Guertin, McGuire, Nowrouzezahrai 2014, after McGuire et al. 2012): taps along the
 // dominant motion around and along the pixel's own, each weighted by whether its motion and depth let it be seen here.
 // Names are the papers': TileMax, NeighborMax, f and b (foreground, background), cone, cylinder.
+//#include common/backwards.wgsl
 //#include common/frame.wgsl
 //#include common/noise.wgsl
 //#include common/shutter.wgsl
@@ -27,12 +28,14 @@ struct Tiles {
 
 override WEIGHTED: bool = false;    // read `weight`
 override PUBLISHED: bool = false;   // weights as printed, not divided by those of uniform motion
+override HAS_DEPTH: bool = true;    // else what moves farther is taken to be in front: see passing()
 override TILES: bool = false;       // show the motion that every tile follows instead of the colour
 
 // The paper's constants.
 const KAPPA: f32 = 40.0;            // the greater, the less the pixel's own colour counts
 const GAMMA: f32 = 1.5;             // extent beyond MIN_EXTENT [px] from which the pixel's own direction is trusted
 const MIN_EXTENT: f32 = 0.5;        // shorter ones [px] are taken to be as long
+const NEAR: f32 = 1.0;              // how far from a pixel a surface passes that is seen there [px]
 
 /// The motion of greatest extent in a row of a tile.
 @compute @workgroup_size(WG_X, WG_Y)
@@ -105,6 +108,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let all = shutter_times(x, frame.jitter * (noise - 0.5));
+    if !PUBLISHED && !HAS_DEPTH {
+        textureStore(output, id.xy, passing(id.xy, all, trajectory_from(neighbor_max[tile_at(x, noise)])));
+        return;
+    }
     let limit = f32(tiles.edge);
     let dominant = limited(trajectory_from(neighbor_max[tile_at(x, noise)]), all.delay, limit);
     let dominant_extent = blur_extent(dominant, all.delay);
@@ -144,6 +151,37 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var result = sum / total;
     if is_static || total <= 0.0 { result = pixel_itself(id.xy); }
     textureStore(output, id.xy, result);
+}
+
+/// The colour without depth: along the pixel's own path, but at times when a surface that moves farther really passes, that
+/// surface's. `dominant`: the motion around, along which it is looked for.
+fn passing(px: vec2u, all: SampleTimes, dominant: Trajectory) -> vec4f {
+    let reach = length(blur_extent(dominant, all.delay));
+    let times = with_adaptive_count(all, 2.0 * reach);
+    let count = select(times.count, 0u, reach <= MIN_EXTENT);
+    let x = vec2f(px) + 0.5;
+    let own = trajectory_from(finite_motion(textureLoad(motion, px, 0)));
+    let source = backwards(motion, own, x);
+    let share = 1.0 / f32(times.count);
+    let texel = 1.0 / vec2f(frame.size);
+    let last = vec2f(frame.size) - 1.0;
+    var sum = vec4f(0.0);
+    var total = 0.0;
+    for (var i = 0u; i < count; i++) {
+        let t = shutter_time(times, i);
+        let offset = displacement(dominant, t);
+        let at = x - offset;
+        let other = trajectory_from(finite_motion(textureLoad(motion, vec2u(clamp(floor(at), vec2f(0.0), last)), 0)));
+        let speed = length(other.velocity);
+        let apart = distance(other.velocity, own.velocity);
+        let is_faster = speed > length(own.velocity) + 0.5 && apart > max(1.0, 0.25 * speed);
+        let passes = is_faster && distance(displacement(other, t), offset) < NEAR;
+        let from_here = select(x + displacement(source, t), at, passes) * texel;
+        sum += share * textureSampleLevel(color, linear, from_here, 0.0);
+        if WEIGHTED { total += share * textureSampleLevel(weight, linear, from_here, 0.0).x; } else { total += share; }
+    }
+    if reach <= MIN_EXTENT || total <= 0.0 { return pixel_itself(px); }
+    return select(sum, sum / total, WEIGHTED);
 }
 
 /// The paper's weight of a tap that is `far` [px] from the pixel, of its velocities and depths `own` and those of the tap.
