@@ -184,4 +184,4 @@ def test_frames_on_disk_open_with_the_method_that_wgmb_blur_takes(
     pattern = tmp_path / "s.#.exr"
     shown = Choices(device).possible(opened_by(monkeypatch, pattern)).method
     assert shown == default_method(Clip(pattern).has)
-    assert shown == ("gather" if with_depth else "tap")
+    assert shown == ("gather" if with_depth else "tiles")
