@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import wgpu
 
-from ..methods import METHODS
+from ..methods import METHODS, default_method
 from ..methods.options import Option, options_of
 from .draw.display import DisplayCache
 from .state.files import reader_of
@@ -157,7 +157,8 @@ class Choices:
         """The same state; a method or look that is not to be had is replaced by one that is."""
         methods = self.methods(state)
         if methods and state.method not in methods:
-            state = state.with_method(methods[0])
+            usual = default_method(self.subject(state).has(state))
+            state = state.with_method(usual if usual in methods else methods[0])
         if state.look not in (looks := self.looks(state)):
             state = replace(state, look=looks[0])
         if state.eyes not in (eyes := self.eyes(state)):
