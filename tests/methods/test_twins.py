@@ -40,7 +40,7 @@ def pictures(size, speed=9.0, seed=0):
 @pytest.mark.parametrize("shutter", SHUTTERS)
 def test_tap_is_its_twin(close, size, shutter, mixing):
     color, motion = pictures(size)
-    got = wgmb.blur(color, motion=motion, shutter=shutter, samples=5)
+    got = wgmb.blur(color, motion=motion, shutter=shutter, samples=5, method="tap")
     times = shutter.sample_times(5).astype(float)
     close(got, tap_twin.tap(color, motion, times, shutter.delay), TOLERANCE + mixing)
 
@@ -49,7 +49,7 @@ def test_tap_is_its_twin(close, size, shutter, mixing):
 @pytest.mark.parametrize("samples", [1, 2, 17])
 def test_straight_taps_are_their_twin(close, size, samples, mixing):
     color, motion = pictures(size, speed=200.0)  # most of it leaves the picture
-    got = wgmb.blur(color, motion=motion, samples=samples, path="straight")
+    got = wgmb.blur(color, motion=motion, samples=samples, path="straight", method="tap")
     times = Shutter(180).sample_times(samples).astype(float)
     close(got, tap_twin.tap(color, motion, times, curved=False), TOLERANCE + mixing)
 
@@ -65,13 +65,17 @@ def test_auto_taps_are_their_twin(close, curve, mixing):
         count = int(np.clip(np.ceil(np.hypot(*motion[y, x, 2:])), 2, 64))
         times = shutter.time((np.arange(count) + 0.5) / count)
         want[y, x] = tap_twin.pixel(color, motion, x, y, times)
-    close(wgmb.blur(color, motion=motion, shutter=shutter, samples="auto"), want, 1e-3 + mixing)
+    close(
+        wgmb.blur(color, motion=motion, shutter=shutter, samples="auto", method="tap"),
+        want,
+        1e-3 + mixing,
+    )
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_published_form_is_its_twin(close, size, mixing):
     color, motion = pictures(size)
-    got = wgmb.blur(color, motion=motion, samples=7, variant="published")
+    got = wgmb.blur(color, motion=motion, samples=7, variant="published", method="tap")
     close(got, tap_twin.published(color, motion[..., :2].astype(float), 7), TOLERANCE + mixing)
 
 
@@ -81,7 +85,7 @@ def test_kept_and_bad_pixels_are_their_twin(close, size, mixing):
     rng = np.random.default_rng(2)
     holdout = np.round(rng.random(size) * 4).clip(0, 2).astype("f4") / 2
     color[rng.random(size) < 0.05] = np.nan
-    got = wgmb.blur(color, motion=motion, holdout=holdout, samples=5)
+    got = wgmb.blur(color, motion=motion, holdout=holdout, samples=5, method="tap")
     lifted, weight = holdout_twin.before(color, holdout)
     times = Shutter(180).sample_times(5).astype(float)
     blurred = tap_twin.tap(lifted, motion, times, weight=weight)
@@ -95,7 +99,9 @@ def test_jittered_taps_are_their_twin(close, curve, mixing):
     """Interleaved gradient noise says where in its share of time a pixel's taps are."""
     color, motion = pictures((17, 23))
     shutter, number = Shutter(360, "start", curve), 5
-    got = wgmb.blur(color, motion=motion, shutter=shutter, samples=3, jitter=0.8, number=number)
+    got = wgmb.blur(
+        color, motion=motion, shutter=shutter, samples=3, jitter=0.8, number=number, method="tap"
+    )
     want, noise = np.zeros(color.shape), noise_of((17, 23), number)
     for y, x in np.ndindex(color.shape[:2]):
         shift = 0.8 * (noise[y, x] - 0.5)
