@@ -27,9 +27,9 @@ max_blur max_displace max_mb method methods motion nature next normal number obj
 object_layer object_motion ocio openjd options orbit output outside overwrite pan passes pattern
 peer phase pitch prev program progress quality quiet reference report resume rolling
 rolling_duration rounds samples save scale scan scene seconds set settings sharp shutter
-shutters size skip_missing slurm source speed streams time to_next to_prev truth try twos vector_flip
-vector_layer vector_mask vector_offset vector_scale vectors verbose version view view_transform
-what window workers wrap
+shutters size skip_missing slurm source speed streams time to_next to_prev truth try twos
+vector_flip vector_layer vector_mask vector_offset vector_scale vectors verbose version view
+view_transform what window workers wrap
 """
 RESERVED = frozenset(_RESERVED.split())
 """Names of arguments and options of wgmb, which no option of a method may have."""
