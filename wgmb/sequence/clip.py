@@ -268,7 +268,15 @@ class Clip:
         """
         return self.cache.sources(number)
 
-    def holds_poses(self, number: int) -> bool:
+    def held_poses(self, most: int) -> list[int]:
+        """Numbers of those of the first `most` frames whose poses are held (`twos`)."""
+        held: list[int] = []
+        for number in self.numbers[:most]:
+            with contextlib.suppress(InputError, OSError):  # its turn to fail comes
+                held += [number] if self._holds_poses(number) else []
+        return held
+
+    def _holds_poses(self, number: int) -> bool:
         """True if poses in frame `number` are held, so that their jumps are left out: `twos`."""
         source = self.source(number)
         frame = self.frame(source, picture=False, normal=False, light=False)

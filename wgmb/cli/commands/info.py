@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -144,10 +143,7 @@ def _views_text(clip: Clip, source: FrameFile) -> str:
 
 def _about_poses(clip: Clip) -> list[tuple[str, str]]:
     """Return a line if the first frames hold poses: frames on ones may come before them."""
-    held: list[int] = []
-    for number in clip.numbers[:_FIRST]:
-        with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-            held += [number] if clip.holds_poses(number) else []
+    held = clip.held_poses(_FIRST)
     if not held:
         return []
     where = f"at {'frame' if len(held) == 1 else 'frames'} {frame_list(held)}"
