@@ -33,7 +33,7 @@ def test_contract(name):
         assert len({red, green, blue, alpha}) == 4
     optional = {
         "samples", "adaptive", "quick", "confidence", "most_in_software", "spread", "margin",
-        "bend",
+        "bend", "repeats", "steps", "finds",
     }  # fmt: skip
     assert public - optional == {
         "name",
