@@ -283,7 +283,7 @@ def _tried(name: str, kind: StatedKind, count: int, folder: Path) -> dict[str, A
     return found
 
 
-def _by_default(words: list) -> list:
+def _by_default(words: list[str]) -> list[str]:
     """The words of a command without those that make it quicker."""
     plain = [word for pair in _PLAINER for word in pair.split()]
     return [word for word in words if word not in plain]
