@@ -100,10 +100,10 @@ def test_what_is_scattered_is_its_twin():
 
 
 def test_spokes_behind_a_post_are_those_of_the_neighbours():
-    """25.6 dB. Spokes that repeat in the neighbours are taken for an outline at rest."""
+    """From what the frame itself scatters: 26.0 dB."""
     look = {"spokes": 7, "post": 14}
     frame, off = frame_of([wheel(t, **look) for t in (0, -1, 1)]), []
     for t in (-0.4, -0.3, 0.3, 0.4):
         got = wgmb.Blur("gather", shutter=Shutter(1, phase=t), samples=1)(frame)
         off.append(np.square(got - wheel(t, **look)[0]).mean())
-    assert -10 * np.log10(np.mean(off)) > 25.5
+    assert -10 * np.log10(np.mean(off)) > 26.1

@@ -318,7 +318,9 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
         pure = [(j, i) for j, i in pixels if not edges[j, i]] or [(y, x)]
         return min(pure, key=lambda p: (p[0] - y) ** 2 + (p[1] - x) ** 2)
 
-    if not thin and outline_rests(z, (y, x), between, behind, before, around_it):
+    if not thin and outline_rests(
+        z, (y, x), nearest_pure(nearer), between, behind, before, around_it
+    ):
         place = nearest_pure(farther)
         path = np.concatenate([behind, told_around[0][place]])
         front_depth = mean(z, front) * told_around[1][place]
@@ -382,7 +384,7 @@ def separate_pixel(color, motion, z, edges, y, x, told_around, around_it, far):
     return front_color, front_path, front_depth, coverage, back_color, behind, back_depth, True
 
 
-def outline_rests(z, at, between, behind, before, around_it):
+def outline_rests(z, at, front_at, between, behind, before, around_it):
     """True if an outline and what is behind it rest, while the surface in front moves."""
 
     def changes(vectors):
@@ -398,8 +400,13 @@ def outline_rests(z, at, between, behind, before, around_it):
                     found += (valid(frame[3][tuple(there)]) < between) != is_front
         return found
 
+    def is_in_front(step):
+        there = np.array(front_at) + np.round(0.5 * step).astype(int)
+        return z[tuple(np.clip(there, 0, np.array(z.shape) - 1))] < between
+
     back_rests = behind @ behind < 0.25
-    return back_rests and changes(np.zeros(4)) == 0 and changes(before) > 0
+    moves = changes(np.zeros(4)) == 0 and changes(before) > 0
+    return back_rests and moves and (is_in_front(before[1::-1]) or is_in_front(before[:1:-1]))
 
 
 def coverage_by_color(own, front, back, at_middle, beyond):

@@ -103,7 +103,7 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     if sides.front.total > 0.0 && sides.back.total > 0.0 && sides.back.weight > 0.0 {
         let axis = sides.front_motion - sides.back_motion;
         if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(edge.motion - sides.back_motion, axis) {
-            if outline_rests(edge, sides) { // the pixel shows the same of both all the time
+            if outline_rests(edge, around, sides) { // the pixel shows the same of both all the time
                 split.front_motion = sides.back_motion;
                 split.front_at = around.back_place.at;
                 split.front_z = sides.front.depth / sides.front.total;
@@ -135,11 +135,19 @@ fn one_layer(edge: EdgePixel, around: Around) -> Split {
 }
 
 /// True if the outline of the front rests, as does what is behind it, while the front's surface moves: a body that turns about
-/// itself. In the neighbouring frames the same pixels are in front as here, and not where the surface goes.
-fn outline_rests(edge: EdgePixel, sides: Sides) -> bool {
+/// itself. In the neighbouring frames the same pixels are in front as here, and not where the surface goes; half way, the body is.
+fn outline_rests(edge: EdgePixel, around: Around, sides: Sides) -> bool {
     let back_rests = dot(sides.back_motion, sides.back_motion) < EDGE_MOTION * EDGE_MOTION;
     return back_rests && !sides.thin && outline_changes(edge, vec4f(0.0)) == 0u
-        && outline_changes(edge, sides.front_motion) > 0u;
+        && outline_changes(edge, sides.front_motion) > 0u
+        && (is_front_half_way(edge, around, sides.front_motion.xy) || is_front_half_way(edge, around, sides.front_motion.zw));
+}
+
+/// True if half a `step` [px] from the front leads to the front of the frame itself, too. Where spokes take each other's places, it
+/// leads between them.
+fn is_front_half_way(edge: EdgePixel, around: Around, step: vec2f) -> bool {
+    let px = around.front_place.at + vec2i(round(0.5 * step));
+    return flagged_depth(flags_at(inside(px))) < edge.between;
 }
 
 /// How many pixels of the 5 x 5 are in front in a neighbouring frame, where these vectors lead, and not here, or the reverse.
