@@ -86,7 +86,7 @@ def local_client(count: int) -> Iterator[Any]:
             leftovers.removed_by(lambda: kill(cluster)),
             closing(Client(cluster, set_as_default=False)) as client,
         ):
-            cluster.scale(count)  # not before: an interruption ends what is in the cluster
+            cluster.scale(count)  # not before: an interruption ends the workers of the cluster
             _wait_for(cluster, client, count)
             yield client
 

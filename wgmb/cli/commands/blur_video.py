@@ -140,7 +140,7 @@ def _blur_each(
 def _one_of_many(run: VideoRun, plan: VideoPlan, tick: Tick, console: Console) -> bool:
     """Blur a video and say so in a line; returns whether all of it is done.
 
-    Its losses and what is assumed of it are a line before the first picture.
+    Its losses and the assumptions about it are a line before the first picture.
     """
     path = plan.reader.path
     known = [*plan.notes, *plan.losses]

@@ -19,7 +19,7 @@ def _cv() -> Any:
     return importlib.import_module("cv2")
 
 
-def settled(pictures: Pictures, motion: np.ndarray) -> np.ndarray:
+def with_dominant(pictures: Pictures, motion: np.ndarray) -> np.ndarray:
     """The motion, with the dominant one in regions that differ from it and fit it as well.
 
     On flat ground and in patterns that repeat, a search finds one motion as well as another. A
