@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 ADD_ON, LOCK = HERE / "wgmb_blender", HERE / "wheels.txt"
 WHEELS = ROOT / "build" / "blender" / "wheels"
-PACKAGES = ("wgpu", "openexr", "cffi", "pycparser", "fileseq", "rubicon-objc")
+PACKAGES = ("wgpu", "openexr", "cffi", "pycparser", "fileseq", "packaging", "rubicon-objc")
 PYTHONS = ("3.11", "3.13")  # of Blender 4.2 to 5.0, and of 5.1
 PLATFORMS = {
     "linux-x64": ("manylinux_2_28_x86_64", "manylinux2014_x86_64"),

@@ -65,11 +65,11 @@ def is_installed(package: str) -> bool:
 
 
 def is_available(package: str) -> bool:
-    """Return False if wgmb does without a package of EXTRAS on the Python that runs."""
-    from .requirements import of_extra
+    """Return False if wgmb does without a package of EXTRAS on this system and Python."""
+    from .requirements import is_excluded
 
     extra, _, name = EXTRAS[package]
-    return all(one.is_for_this_python for one in of_extra(extra) if one.name.lower() == name)
+    return not is_excluded(name, extra)
 
 
 @contextlib.contextmanager
@@ -115,13 +115,13 @@ def install_command(extra: str) -> str:
     """
     if run := _run_of_the_clone():
         return f"{run} setup {extra}"
-    from .requirements import of_extra
+    from .requirements import is_met, line, of_extra
 
-    needed = [one for one in of_extra(extra) if one.is_for_this_python]
+    needed = of_extra(extra)
     named = [package.index_name for package in EXTRAS.values() if package.extra == extra]
-    if lacking := [str(one) for one in needed if not one.is_met]:
+    if lacking := [line(one) for one in needed.values() if not is_met(one)]:
         return _pip(lacking)
-    own = [str(one) for one in needed if one.name.lower() in named]
+    own = [line(one) for name, one in needed.items() if name in named]
     if not own and not named:
         return f"the extra {extra} of wgmb has it"
     return _pip(["--force-reinstall", "--no-deps", *own] if own else named)  # files are damaged

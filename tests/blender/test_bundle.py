@@ -22,8 +22,8 @@ done = bpy.ops.extensions.package_install_files(
     filepath=sys.argv[1], repo="user_default", enable_on_install=True
 )
 assert done == {{"FINISHED"}}, done
-import OpenEXR, cffi, fileseq, wgmb, wgpu
-for module in (OpenEXR, cffi, fileseq, wgmb, wgpu):
+import OpenEXR, cffi, fileseq, packaging, wgmb, wgpu
+for module in (OpenEXR, cffi, fileseq, packaging, wgmb, wgpu):
     assert "extensions" in module.__file__ and sys.argv[2] in module.__file__, module.__file__
 sys.path.insert(0, {str(ROOT / "tests" / "blender")!r})
 import scenes
@@ -56,7 +56,7 @@ def test_a_bundle_is_small_valid_and_whole(bundles, platform):
     listed = [line.strip(' ",').removeprefix("./") for line in text.splitlines() if ".whl" in line]
     assert sorted(listed) == sorted(wheels)
     of = [Path(name).name.partition("-")[0] for name in wheels]
-    assert {"wgmb", "wgpu", "openexr", "cffi", "pycparser", "fileseq"} <= set(of)
+    assert {"wgmb", "wgpu", "openexr", "cffi", "pycparser", "fileseq", "packaging"} <= set(of)
     assert ("rubicon_objc" in of) == platform.startswith("macos")
     assert of.count("openexr") == of.count("cffi") == len(build.PYTHONS)
     assert not any("numpy" in name or "__pycache__" in name for name in names)

@@ -43,6 +43,7 @@ HOMES = {
     "imageio": {"io"},
     "PIL": {"io", "lab"},
     "fileseq": {"io"},
+    "packaging": {"requirements"},
     "cv2": {"flow"},
     "PyOpenColorIO": {"color"},
     "opentimelineio": {"shots"},

@@ -25,7 +25,7 @@ from ..exit_codes import DONE, NO_DEVICE, SOME_FAILED
 from ..spelling import as_options
 from ..terminal import out
 
-CORE = ("wgpu", "numpy", "OpenEXR", "fileseq")
+CORE = ("wgpu", "numpy", "OpenEXR", "fileseq", "packaging")
 VARIABLES = (
     "WGMB_ADAPTER", "OCIO", "VK_DRIVER_FILES", "VK_ADD_DRIVER_FILES", "VK_ICD_FILENAMES",
     "VK_LOADER_DRIVERS_SELECT", "VK_LOADER_DRIVERS_DISABLE", "MESA_VK_DEVICE_SELECT", "DRI_PRIME",
