@@ -13,7 +13,7 @@ from rendercanvas.auto import RenderCanvas, loop
 from wgmb.hosts.pygfx import MotionBlurPass
 
 
-def main(method: str = "tap", frames: int | None = None) -> np.ndarray | None:
+def main(method: str = "tiles", frames: int | None = None) -> np.ndarray | None:
     """Open the window, or draw so many `frames` offscreen and return the last picture."""
     canvas = RenderCanvas(size=(960, 540), title=f"wgmb: {method}", update_mode="continuous")
     renderer = pygfx.WgpuRenderer(canvas)

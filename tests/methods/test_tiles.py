@@ -31,6 +31,18 @@ def moving_box(top: int, left: int, velocity) -> np.ndarray:
     return wgmb.blur(color, motion, method="tiles")[..., 0]
 
 
+@pytest.mark.parametrize("depth", [None, 2])
+@pytest.mark.parametrize("speed", [0.5, 1, 1.9])
+def test_slow_motion_blurs_as_along_its_path(speed, depth):
+    """The published filter leaves motion that reaches less than half a pixel to either side."""
+    ground = np.random.default_rng(0).random((90, 120, 3), np.float32)
+    motion = np.full((90, 120, 2), (speed, 0), np.float32)
+    layers = {} if depth is None else {"depth": np.full((90, 120), depth, np.float32)}
+    tap = wgmb.blur(ground, motion, method="tap", **layers)
+    got = wgmb.blur(ground, motion, method="tiles", **layers)
+    assert np.abs(got - tap).max() < 1e-5 < np.abs(tap - ground).max()
+
+
 @pytest.mark.parametrize("velocity", [(48, 0), (34, 20), (0, 40)])
 @pytest.mark.parametrize(("top", "left"), [(60, 120), (50, 113)])
 def test_a_box_has_no_specks_at_its_corners(top, left, velocity):

@@ -6,7 +6,7 @@ import numpy as np
 
 from twins.tap import bilinear, displacement, source
 
-KAPPA, GAMMA, SHORT, FAR, NEAR = 40.0, 1.5, 0.5, 1e10, 1.0
+KAPPA, GAMMA, SHORT, FAR, NEAR, STATIC = 40.0, 1.5, 0.5, 1e10, 1.0, 0.01
 
 
 def tiles(color, motion, depth, times, span, noise, edge, published=False, weight=None):
@@ -21,11 +21,11 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
     out = np.zeros(color.shape)
     for y, x in np.ndindex(height, width):
         tile = _tile(x, y, noise[y, x], edge, dominant.shape)
-        if depth is None and not published:
+        fast = _held(dominant[tile], span, edge)
+        reach = _streak(fast, span)
+        if not published and (depth is None or reach <= SHORT):
             out[y, x] = _passing(color, motion, times, span, dominant[tile], weight, y, x)
             continue
-        fast = _held(dominant[tile], span, edge)
-        reach = max(_streak(fast, span), SHORT)
         if reach <= SHORT:
             out[y, x] = _own(color, weight, y, x)
             continue
@@ -56,7 +56,7 @@ def tiles(color, motion, depth, times, span, noise, edge, published=False, weigh
 
 def _passing(color, motion, times, span, fast, weight, y, x):
     """The pixel's own path, but what moves farther when it passes."""
-    if _streak(fast, span) <= SHORT:
+    if _streak(fast, span) < STATIC:
         return _own(color, weight, y, x)
     height, width = color.shape[:2]
     here, own, total, counted = np.array([x + 0.5, y + 0.5]), _velocity(motion[y, x]), 0.0, 0.0

@@ -55,7 +55,7 @@ class MotionBlurPass(EffectPass):
     def __init__(
         self,
         camera: pygfx.Camera,
-        method: MethodName = "tap",
+        method: MethodName = "tiles",
         *,
         renderer: pygfx.WgpuRenderer | None = None,
         scene: pygfx.WorldObject | None = None,

@@ -108,17 +108,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let all = shutter_times(x, frame.jitter * (noise - 0.5));
-    if !PUBLISHED && !HAS_DEPTH {
-        textureStore(output, id.xy, passing(id.xy, all, trajectory_from(neighbor_max[tile_at(x, noise)])));
+    let greatest = trajectory_from(neighbor_max[tile_at(x, noise)]);
+    let limit = f32(tiles.edge);
+    let dominant = limited(greatest, all.delay, limit);
+    let dominant_extent = blur_extent(dominant, all.delay);
+    let reach = length(dominant_extent);
+    let is_slow = reach <= MIN_EXTENT;
+    if !PUBLISHED && (is_slow || !HAS_DEPTH) {  // where all motion is slow, no surface covers another
+        textureStore(output, id.xy, passing(id.xy, all, greatest));
         return;
     }
-    let limit = f32(tiles.edge);
-    let dominant = limited(trajectory_from(neighbor_max[tile_at(x, noise)]), all.delay, limit);
-    let dominant_extent = blur_extent(dominant, all.delay);
-    let reach = max(length(dominant_extent), MIN_EXTENT);
     let times = with_adaptive_count(all, 4.0 * reach);      // to both sides, in two directions by turns
-    let is_static = reach <= MIN_EXTENT;
-    let count = select(times.count, 0u, is_static);
+    let count = select(times.count, 0u, is_slow);           // published: slow motion does not blur
 
     // The paper's v_max is along `dominant`, its v_c is `odd_direction`, followed by every second tap.
     let own = textureLoad(velocity_depth, id.xy, 0);
@@ -149,16 +150,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         if WEIGHTED { total += w * textureSampleLevel(weight, linear, at * texel, 0.0).x; } else { total += w; }
     }
     var result = sum / total;
-    if is_static || total <= 0.0 { result = pixel_itself(id.xy); }
+    if is_slow || total <= 0.0 { result = pixel_itself(id.xy); }
     textureStore(output, id.xy, result);
 }
 
-/// The colour without depth: along the pixel's own path, but at times when a surface that moves farther really passes, that
-/// surface's. `dominant`: the motion around, along which it is looked for.
+/// The colour without depth, or where all motion is slow: along the pixel's own path, but at times when a surface that moves
+/// farther really passes, that surface's. `dominant`: the motion around, along which it is looked for.
 fn passing(px: vec2u, all: SampleTimes, dominant: Trajectory) -> vec4f {
     let reach = length(blur_extent(dominant, all.delay));
     let times = with_adaptive_count(all, 2.0 * reach);
-    let count = select(times.count, 0u, reach <= MIN_EXTENT);
+    let is_static = reach < STATIC_EPSILON;
+    let count = select(times.count, 0u, is_static);
     let x = vec2f(px) + 0.5;
     let own = trajectory_from(finite_motion(textureLoad(motion, px, 0)));
     let source = backwards(motion, own, x);
@@ -180,7 +182,7 @@ fn passing(px: vec2u, all: SampleTimes, dominant: Trajectory) -> vec4f {
         sum += share * textureSampleLevel(color, linear, from_here, 0.0);
         if WEIGHTED { total += share * textureSampleLevel(weight, linear, from_here, 0.0).x; } else { total += share; }
     }
-    if reach <= MIN_EXTENT || total <= 0.0 { return pixel_itself(px); }
+    if is_static || total <= 0.0 { return pixel_itself(px); }
     return select(sum, sum / total, WEIGHTED);
 }
 
