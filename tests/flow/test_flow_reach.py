@@ -4,9 +4,9 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from counted import counted
 
 from wgmb.flow import Flow
+from wgmb.lab.calls import counted
 from wgmb.sequence.flow_motion import FAR
 
 HEIGHT, COUNT = 16, 24  # narrow bands: the number of levels depends on the longer side

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from counted import counted
 
 import wgmb
 from wgmb import Blur, DeviceError, Shutter, gpu
 from wgmb.gpu.textures import TexturePool
+from wgmb.lab.calls import counted
 
 SIZE = (50, 34)  # width, height
 METHODS = {

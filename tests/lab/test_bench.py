@@ -28,20 +28,23 @@ def run(device):
 def test_every_method_has_a_figure_for_every_size_and_number(run):
     keys = {f.key for f in run.figures}
     assert keys == {(m, *size, n) for m in METHODS for size in SIZES for n in (2, 4)}
-    assert all(f.gpu > 0 for f in run.figures)
+    assert all(f.wall > 0 and f.gpu >= 0 for f in run.figures)
 
 
 @pytest.mark.full
 def test_methods_of_pictures_have_transfers_and_bytes(run):
     for f in run.figures:
         if "scene" in METHODS[f.method].needs:
-            assert (f.call, f.upload, f.readback, f.bytes) == (None, None, None, 0)
+            assert (f.call, f.upload, f.readback, f.record, f.bytes) == (None,) * 4 + (0,)
+            assert f.gpu == pytest.approx(f.summed)  # submitted by itself, in portions
         else:
-            assert min(f.gpu, f.upload, f.readback) > 0
-            assert f.call == pytest.approx(f.upload + f.gpu + f.readback)
+            assert min(f.wall, f.upload, f.readback) > 0 and f.gpu >= 0
+            assert 0 < f.record < f.wall
+            assert f.call > f.upload + f.readback
             # Colour, motion and the output are there at least, 16 bytes a pixel each.
             assert f.bytes >= 48 * f.width * f.height
-            assert f.bandwidth == pytest.approx(f.bytes / (f.gpu / 1e3) / 1e9)
+            if f.gpu:  # too short for a wall clock, it may be 0
+                assert f.bandwidth == pytest.approx(f.bytes / (f.gpu / 1e3) / 1e9)
     tap, reproject = (next(f for f in run.figures if f.method == m) for m in ("tap", "reproject"))
     assert tap.bytes == 48 * tap.width * tap.height
     assert reproject.bytes == (16 + 3 * 36) * tap.width * tap.height  # three frames with depth
@@ -66,6 +69,20 @@ def test_what_was_not_kept_is_refused(run, tmp_path):
         bench_figures.Bench.load(tmp_path / "x.json")
 
 
+def test_a_bench_of_other_fields_is_refused_in_one_line(run, tmp_path, capsys):
+    """Files of other versions are no saved benches of this one."""
+    run.save(tmp_path / "old.json")
+    data = json.loads((tmp_path / "old.json").read_text())
+    for change in ({"figures": [{k: v for k, v in f.items() if k != "wall"}
+                                for f in data["figures"]]},
+                   {"figures": [f | {"frame": 1.0} for f in data["figures"]]},
+                   {"videos": [{"flow": "none"}]}):  # fmt: skip
+        (tmp_path / "old.json").write_text(json.dumps(data | change))
+        code, out, err = make.inside(capsys, "bench", "--against", tmp_path / "old.json")
+        assert (code, out) == (2, "")
+        assert "old.json: not a saved bench" in err and err.count("\n") == 1
+
+
 def test_another_run_with_nothing_in_common_says_so(run):
     table = bench_report.against(run, bench_figures.Bench({}, 1.0, []))
     assert not table.rows and "in common" in table.note
@@ -88,7 +105,7 @@ def test_wrong_usage_is_said_before_the_work(tmp_path, monkeypatch, capsys, argu
 
 
 def test_slower_is_over_one(run):
-    slow = [replace(f, gpu=2 * f.gpu) for f in run.figures]
+    slow = [replace(f, wall=2 * f.wall) for f in run.figures]
     table = bench_report.against(bench_figures.Bench(run.machine, run.copy, slow), run)
     assert all(row[-2] == 2.0 for row in table.rows)
 
@@ -103,7 +120,7 @@ def test_text_and_page_tell_every_method(run):
     assert {"tiles", "gather", "reproject", "accumulate"} <= several
     groups = {(f.size, f.samples) for f in run.figures}
     assert page.count("<svg") == len(groups) + 2 + len(several)
-    assert "upload + gpu + readback" in said and "bandwidth, at least" in said
+    assert "upload + frame + readback" in said and "bandwidth, at least" in said
     assert "methods/accumulate.wgsl:main x 4" in said
 
 
@@ -153,10 +170,56 @@ def test_the_command_prints_saves_and_compares(tmp_path, capsys):
     assert titles == ["Every method", "Every pass", "Against an earlier run"]
 
 
-@pytest.mark.parametrize("options", ["--rounds 0", "--samples x", "--methods smear",
+def test_a_video_has_a_rate_and_counts_of_a_picture(device, tmp_path):
+    run = bench.bench(device, [], SIZES[:1], (), rounds=2, flows=["none"])
+    (one,) = run.videos
+    assert (one.key, one.pictures) == (("none", *SIZES[0]), 2)
+    assert min(one.rate, one.thread, one.counts["waits"]) > 0 and one.counts["passes"] == 2
+    made = bench_report.report(run, "", run)
+    assert "video, flow none" in bench_report.text(run)
+    assert "2 passes, " in bench_report.text(run)
+    assert [row[0] for row in made.tables[2].rows] == ["none"] and made.tables[2].title == "Videos"
+    assert [row[-2] for row in made.tables[-1].rows] == [1.0]  # against itself
+    run.save(tmp_path / "kept.json")
+    assert bench_figures.Bench.load(tmp_path / "kept.json") == run
+    assert report.page(made).count("none</td>") >= 1
+
+
+@pytest.mark.full
+def test_a_video_whose_motion_is_searched_has_more_passes(device):
+    run = bench.bench(device, [], SIZES[:1], (), rounds=1, flows=["none", "search:draft"])
+    assert [v.flow for v in run.videos] == ["none", "search:draft"]
+    assert 2 * run.videos[0].counts["passes"] < run.videos[1].counts["passes"]
+
+
+def test_a_video_that_takes_long_has_fewer_pictures(device):
+    run = bench.bench(device, [], SIZES[:1], (), rounds=4, flows=["none"], limit=1e-9)
+    assert run.videos[0].pictures == 1
+
+
+@pytest.mark.parametrize("options, wanted", [
+    ([], (True, ["auto"])), (["--methods", "tap"], (True, [])),
+    (["--flow", "none,dis:fast,none"], (False, ["none", "dis:fast"])),
+    (["--flow", "none", "--methods", "tap"], (True, ["none"])),
+])  # fmt: skip
+def test_methods_videos_or_both_are_timed(monkeypatch, capsys, options, wanted):
+    """Without a choice, both are."""
+    asked = []
+
+    def measure(device, candidates, sizes, counts, rounds, seconds, say, flows):
+        asked.append((bool(candidates), flows))
+        return bench_figures.Bench({"adapter": "none"}, 1.0, [])
+
+    monkeypatch.setattr(bench, "bench", measure)
+    assert app.main(["bench", *options]) == 0
+    assert asked == [wanted]
+
+
+@pytest.mark.parametrize("options", ["--flow smear", "--flow search:worst", "--flow dis:draft",
+                                     "--rounds 0", "--samples x", "--methods smear",
                                      "--against no.json", "--size big", "--seconds 0"])  # fmt: skip
 def test_wrong_usage_is_one_line_and_2(capsys, options):
-    code, out, err = make.inside(capsys, "bench", *options.split())
+    code, out, err = make.inside(capsys, "bench", "--size", "64x36", *options.split())
     assert (code, out) == (2, "")
     assert err.startswith("wgmb: ") and err.count("\n") == 1
 

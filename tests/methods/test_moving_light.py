@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from counted import counted
 
 import wgmb
 from twins import moving_light as twin
@@ -17,6 +16,7 @@ from wgmb import (
 )
 from wgmb import scene as scenes
 from wgmb.gpu.textures import TexturePool
+from wgmb.lab.calls import counted
 from wgmb.methods.gather.shading import (
     Kind,
     LightTimes,

@@ -32,6 +32,10 @@ class _Clock:
     def _seconds(self) -> list[float]:
         raise NotImplementedError
 
+    def span(self, record: Callable[[wgpu.GPUCommandEncoder], None]) -> float:
+        """Seconds that the GPU takes for all that `record` records, from its begin to its end."""
+        raise NotImplementedError
+
     def read(self) -> dict[str, float]:
         """Seconds per pass, after the work was submitted; passes of one name are added up.
 
@@ -85,16 +89,33 @@ class TimestampClock(_Clock):
             }
         }
 
+    def span(self, record: Callable[[wgpu.GPUCommandEncoder], None]) -> float:
+        """Seconds between the timestamps of two empty passes, before the first and after the last.
+
+        What `record` records is not changed by it.
+        """
+        encoder = self.device.create_command_encoder(label="span")
+        encoder.begin_compute_pass(label="begin", **self.of("begin")).end()
+        record(encoder)
+        encoder.begin_compute_pass(label="end", **self.of("end")).end()
+        submit(self.device, encoder)
+        stamps = self._stamps()
+        self.labels.clear()
+        return max(0, int(stamps[-1, 0]) - int(stamps[0, 1])) * self._tick
+
     def _seconds(self) -> list[float]:
+        return [(int(end) - int(begin)) * self._tick for begin, end in self._stamps()]
+
+    def _stamps(self) -> np.ndarray:
+        """(passes, 2) ticks at the begin and at the end of each pass."""
         if not self.labels:
-            return []
+            return np.zeros((0, 2), np.uint64)
         usage = wgpu.BufferUsage.QUERY_RESOLVE | wgpu.BufferUsage.COPY_SRC
         buffer = self.device.create_buffer(size=16 * len(self.labels), usage=usage)
         encoder = self.device.create_command_encoder()
         encoder.resolve_query_set(self._queries, 0, 2 * len(self.labels), buffer, 0)
         submit(self.device, encoder)
-        stamps = np.asarray(self.device.queue.read_buffer(buffer)).view("<u8").reshape(-1, 2)
-        return [(int(end) - int(begin)) * self._tick for begin, end in stamps]
+        return np.asarray(self.device.queue.read_buffer(buffer)).view("<u8").reshape(-1, 2)
 
 
 class _Stamped:
@@ -136,6 +157,13 @@ class WallClock(_Clock):
         self.empty = min(self.empty, empty)
         self._took.append(self._run(encoder))
         self.labels.append(label)
+
+    def span(self, record: Callable[[wgpu.GPUCommandEncoder], None]) -> float:
+        """Seconds from the submission of all passes at once to their end."""
+        self._run(self.device.create_command_encoder())  # waits for all that came before
+        encoder = self.device.create_command_encoder(label="span")
+        record(encoder)
+        return max(self._run(encoder) - self.empty, 0.0)
 
     def _run(self, encoder: wgpu.GPUCommandEncoder) -> float:
         started = time.perf_counter()

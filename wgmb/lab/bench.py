@@ -24,14 +24,15 @@ from ..frame import Frame
 from ..gpu import timing
 from ..shutter import Shutter
 from .baselines import numba_tap
-from .bench_figures import Bench, BenchFigure
+from .bench_figures import Bench, BenchFigure, VideoFigure
 from .cases import Candidate, Tell
 from .results import machine
 from .timed import TimedFrame, TimedScene
+from .video_bench import time_video
 
 MEAN_SPEED = 14.5  # [px per frame interval], of the synthetic frame
 _COPY = 64 << 20  # bytes, of the copy that tells the machine's bandwidth
-_HEAVY = 2  # parts of a figure that draw a whole frame: passes, and call or work
+_HEAVY = 3  # parts of a figure that draw a whole frame at most: passes, call, span
 _MEMORY = 0.75  # share of the machine's memory that textures and buffers may take
 
 
@@ -55,8 +56,11 @@ def bench(
     rounds: int = 9,
     limit: float = math.inf,
     tell: Tell = lambda text: None,
+    flows: Iterable[str] = (),
 ) -> Bench:
     """Time every candidate at every size with every number of samples.
+
+    Then pictures of a video at every size by all `flows`, each NAME[:QUALITY]; see `time_video`.
 
     `limit`: seconds for one of them at one size and number. It gets fewer rounds where they
     would take longer, and is left out, which `notes` say, where three frames would, going by
@@ -68,7 +72,8 @@ def bench(
     if not limit > 0:
         raise InputError(f"seconds must be over 0, got {limit}")
     matrix = _Matrix(device, list(candidates), rounds, limit, tell)
-    groups = list(itertools.product(sorted(sizes, key=math.prod), sorted(samples)))
+    sizes, flows = sorted(sizes, key=math.prod), list(flows)
+    groups = list(itertools.product(sizes, sorted(samples))) if matrix.candidates else []
     pace = 1.0  # what a group took in proportion to what was told
     try:
         for i, (size, count) in enumerate(groups):
@@ -79,15 +84,17 @@ def bench(
             matrix.measure(size, count)
             if left[0]:
                 pace *= (time.perf_counter() - started) / left[0]
+        for size, flow in itertools.product(sizes, flows):
+            matrix.measure_video(size, flow)
     except KeyboardInterrupt:
-        if not matrix.figures:
+        if not matrix.figures and not matrix.videos:
             raise
         matrix.notes.append("interrupted: the rest is skipped")
-    if not matrix.figures:
+    if not matrix.figures and not matrix.videos:
         raise InputError(matrix.notes[-1] if matrix.notes else "no methods to time")
     name, empty = matrix.clock.name, 1e3 * matrix.clock.empty
     copy = copy_bandwidth(device)
-    return Bench(machine(device), copy, matrix.figures, name, empty, matrix.notes)
+    return Bench(machine(device), copy, matrix.figures, name, empty, matrix.notes, matrix.videos)
 
 
 def _described(size: tuple[int, int], samples: int) -> str:
@@ -113,6 +120,7 @@ class _Matrix:
         self.device, self.candidates, self.rounds, self.limit = device, candidates, rounds, limit
         self.tell, self.clock = tell, timing.clock(device)
         self.figures: list[BenchFigure] = []
+        self.videos: list[VideoFigure] = []
         self.notes: list[str] = []
 
     def note(self, text: str) -> None:
@@ -165,7 +173,9 @@ class _Matrix:
                     name,
                     *size,
                     samples,
-                    drawn,
+                    wall=drawn,
+                    record=one.record and 1e3 * one.record,
+                    gpu=1e3 * one.gpu(),
                     **parts,
                     passes={
                         k: 1e3 * s for k, s in timing.medians(one.runs[1:] or one.runs).items()
@@ -177,6 +187,19 @@ class _Matrix:
                     peak=_peak(),
                 )
             )
+
+    def measure_video(self, size: tuple[int, int], flow: str) -> None:
+        """Pictures of a video whose motion comes from `flow`."""
+        gc.collect()
+        name = f"{size[0]} x {size[1]}, video by {flow}"
+        self.tell(name)
+        try:
+            with gpu.reported(size):
+                one = time_video(self.device, flow, size, self.rounds, self.limit)
+        except (InputError, GpuMemoryError) as error:
+            self.note(f"{name} skipped: {error}")
+            return
+        self.videos.append(one)
 
     def _check(self, name: str, size: tuple[int, int], samples: int, held: int) -> None:
         """Refuse runs that take too long, or more memory than there is."""
@@ -193,7 +216,7 @@ class _Matrix:
         """Seconds of a frame, in proportion to pixels and samples; 0 where nothing is known."""
         known = [f for f in self.figures if f.method == name]
         return min(
-            (f.gpu / 1e3 * math.prod(size) / math.prod(f.size) * max(1, samples / f.samples)
+            (f.wall / 1e3 * math.prod(size) / math.prod(f.size) * max(1, samples / f.samples)
              for f in known), default=0.0,
         )  # fmt: skip
 

@@ -20,10 +20,18 @@ class BenchFigure:
     width: int
     height: int
     samples: int
+    wall: float
+    """A frame, from its recording to the end of the work."""
+    record: float | None
+    """Of the calling thread: to record the frame's passes. None for a scene, which waits between
+    its portions."""
     gpu: float
-    """All passes, from recording to the end of the work."""
+    """Of the GPU: from the begin of the first pass to the end of the last one.
+
+    With the wall clock: from the submission of all passes to their end. The sum of the passes of a
+    scene, which submits them by itself."""
     call: float | None = None
-    """Arrays in, array out: `upload`, `gpu` and `readback` of the same call, whose time is the
+    """Arrays in, array out: `upload`, `wall` and `readback` of the same call, whose time is the
     median."""
     upload: float | None = None
     readback: float | None = None
@@ -51,9 +59,39 @@ class BenchFigure:
         return self.width, self.height
 
     @property
-    def bandwidth(self) -> float:
-        """`bytes` over `gpu` [GB/s]."""
-        return self.bytes / self.gpu / 1e6
+    def summed(self) -> float:
+        """All passes, each timed by itself."""
+        return sum(self.passes.values())
+
+    @property
+    def bandwidth(self) -> float | None:
+        """`bytes` over `gpu` [GB/s]; None if either is 0."""
+        return self.bytes / self.gpu / 1e6 if self.bytes and self.gpu else None
+
+
+@dataclass(frozen=True)
+class VideoFigure:
+    """A source of motion, and pictures of one size that were blurred by it, in steady state."""
+
+    flow: str
+    """NAME[:QUALITY], as the settings `flow` and `flow_quality`."""
+    width: int
+    height: int
+    how: str
+    """The source in words."""
+    pictures: int
+    """Number of those that were timed."""
+    rate: float
+    """Pictures a second, arrays in and out."""
+    thread: float
+    """Milliseconds of the calling thread a picture, without waits."""
+    counts: dict[str, float]
+    """Of a picture: what was asked of wgpu (see calls.py), and what was made."""
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """Key by which figures of two runs are matched."""
+        return self.flow, self.width, self.height
 
 
 @dataclass(frozen=True)
@@ -69,6 +107,7 @@ class Bench:
     """Milliseconds of an empty submission, taken from every pass that wall clock timed."""
     notes: list[str] = field(default_factory=list)
     """Skipped runs, with the reasons."""
+    videos: list[VideoFigure] = field(default_factory=list)
 
     def save(self, path: Path) -> None:
         """As JSON, for `load`."""
@@ -80,6 +119,8 @@ class Bench:
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
             figures = [BenchFigure(**f) for f in data["figures"]]
-            return cls(**data | {"copy": float(data["copy"]), "figures": figures})
+            videos = [VideoFigure(**v) for v in data["videos"]]
+            read = {"copy": float(data["copy"]), "figures": figures, "videos": videos}
+            return cls(**data | read)
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise InputError(f"{path}: not a saved bench: {error}") from None

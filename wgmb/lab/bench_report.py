@@ -16,8 +16,10 @@ def text(run: Bench) -> str:
     for f in run.figures:
         pixels = f.width * f.height
         lines.append(f"{f.width} x {f.height}, {f.method}, {f.samples} samples")
-        rows = [("call: upload + gpu + readback", f.call), ("  upload", f.upload),
-                ("  gpu", f.gpu), ("  readback", f.readback),
+        rows = [("call: upload + frame + readback", f.call), ("  upload", f.upload),
+                ("frame: from its recording to its end", f.wall),
+                ("  recording, the calling thread", f.record), ("  gpu", f.gpu),
+                ("  readback", f.readback), ("sum of all passes", f.summed),
                 *((f"pass {_times(f, k)}", v) for k, v in f.passes.items()),
                 ("numba tap", f.numba)]  # fmt: skip
         for name, milliseconds in rows:
@@ -25,13 +27,20 @@ def text(run: Bench) -> str:
                 each = 1e6 * milliseconds / pixels
                 lines.append(f"  {name:42}{milliseconds:9.2f} ms {each:8.1f} ns per pixel")
         if f.numba:
-            lines.append(f"  gpu / numba tap{f.gpu / f.numba:36.2f}")
-        if f.bytes:
+            lines.append(f"  frame / numba tap{f.wall / f.numba:34.2f}")
+        if f.bandwidth:
             share = f.bandwidth / run.copy
             lines.append(f"  bandwidth, at least{f.bandwidth:32.2f} GB/s {share:6.0%} of a copy")
         lines.append(
             f"  memory held{f.memory / 2**20:40.2f} MB {f.memory / pixels:8.1f} B per pixel"
         )
+    for v in run.videos:
+        lines.append(f"{v.width} x {v.height}, video, flow {v.flow} ({v.how})")
+        lines.append(
+            f"  {v.rate:.3g} pictures a second; the thread works {v.thread:.1f} ms a picture"
+        )
+        asked = ", ".join(f"{each:.4g} {kind}" for kind, each in v.counts.items())
+        lines.append(f"  a picture: {asked}")
     lines += run.notes
     return "\n".join(lines) + "\n"
 
@@ -42,12 +51,15 @@ def _times(f: BenchFigure, label: str) -> str:
 
 
 def _clocked(run: Bench) -> str:
-    """Return a description of the clock of the passes."""
+    """Return a description of the clock of the passes and of `gpu`."""
     if run.clock == TimestampClock.name:
-        return "Passes timed by the GPU's timestamps"
+        return (
+            "Passes timed by the GPU's timestamps; gpu is from the begin of the first to the end "
+            "of the last"
+        )
     return (
-        "Passes timed by wall clock, each submitted separately, minus the "
-        f"{run.empty:.2f} ms of an empty submission"
+        "Passes timed by wall clock, each submitted separately, gpu from the submission of all to "
+        f"the end; of both, the {run.empty:.2f} ms of an empty submission are taken off"
     )
 
 
@@ -58,11 +70,17 @@ def against(run: Bench, before: Bench) -> Table:
     for f in run.figures:
         if (was := old.get(f.key)) is None:
             continue
-        peers = f.gpu / f.numba / (was.gpu / was.numba) if f.numba and was.numba else None
-        rows.append([*_first(f), round(was.gpu, 2), round(f.gpu, 2), round(f.gpu / was.gpu, 2),
+        peers = f.wall / f.numba / (was.wall / was.numba) if f.numba and was.numba else None
+        rows.append([*_first(f), round(was.wall, 2), round(f.wall, 2), round(f.wall / was.wall, 2),
                      None if peers is None else round(peers, 2)])  # fmt: skip
     columns = ["method", "size", "samples", "before [ms]", "now [ms]", "now / before",
                "the same, by numba"]  # fmt: skip
+    videos = {v.key: v for v in before.videos}
+    for v in run.videos:
+        if (then := videos.get(v.key)) is not None:
+            was_ms, now_ms = 1e3 / then.rate, 1e3 / v.rate
+            rows.append([f"video, {v.flow}", f"{v.width} x {v.height}", None, round(was_ms, 2),
+                         round(now_ms, 2), round(now_ms / was_ms, 2), None])  # fmt: skip
     note = f"Before: {before.machine.get('adapter')}, {before.machine.get('made')}."
     if not rows:
         note += " The two runs have no method, size and samples in common."
@@ -72,8 +90,11 @@ def against(run: Bench, before: Bench) -> Table:
 def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     """The figures as tables and plots, for report.py."""
     made = Report("Speed of the methods", command, run.machine, 0)
-    columns = ["method", "size", "samples", "GPU [ms]", "ns per pixel", "/ numba tap"]
+    columns = ["method", "size", "samples", "frame [ms]", "ns per pixel", "/ numba tap"]
     columns += [
+        "recording [ms]",
+        "GPU [ms]",
+        "sum of passes [ms]",
         "upload [ms]",
         "readback [ms]",
         "call [ms]",
@@ -82,13 +103,14 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     ]
     rows = []
     for f in run.figures:
-        each, moved = 1e6 * f.gpu / (f.width * f.height), f.bandwidth if f.bytes else None
-        values = (f.gpu, each, f.numba and f.gpu / f.numba, f.upload, f.readback, f.call, moved,
-                  moved and moved / run.copy)  # fmt: skip
+        each, moved = 1e6 * f.wall / (f.width * f.height), f.bandwidth
+        values = (f.wall, each, f.numba and f.wall / f.numba, f.record, f.gpu, f.summed, f.upload,
+                  f.readback, f.call, moved, moved and moved / run.copy)  # fmt: skip
         rows.append([*_first(f), *map(_round, values), f.memory >> 20, f.peak >> 20])
     columns += ["memory held [MB]", "peak of the process [MB]"]
     note = (
-        "A call takes arrays and returns one: upload, GPU and readback. "
+        "A frame is timed from the recording of its passes to the end of the work. A call takes "
+        "arrays and returns one: upload, frame and readback. "
         f"A copy moves {run.copy:.1f} GB/s. Bytes count inputs and output, each once. "
         "Memory of a method is that of its textures and buffers, including inputs and output; "
         "memory of the process is the peak so far over all methods, in the order of the rows."
@@ -102,6 +124,8 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     ]
     columns = ["method", "size", "samples", "pass", "times", "all of them [ms]", "share"]
     made.tables.append(Table("Every pass", columns, passes, f"{_clocked(run)}."))
+    if run.videos:
+        made.tables.append(_videos(run))
     made.notes += run.notes
     if before:
         made.tables.append(against(run, before))
@@ -110,13 +134,30 @@ def report(run: Bench, command: str, before: Bench | None = None) -> Report:
     return made
 
 
+def _videos(run: Bench) -> Table:
+    """Pictures of videos."""
+    kinds = list(run.videos[0].counts)
+    columns = ["flow", "size", "pictures a second", "thread [ms a picture]", *kinds, "timed"]
+    rows = [
+        [v.flow, f"{v.width} x {v.height}", *map(_round, (v.rate, v.thread, *v.counts.values())),
+         v.pictures]
+        for v in run.videos
+    ]  # fmt: skip
+    note = (
+        "Pictures that lie in memory, blurred by the default settings at 180 degrees. Thread: time "
+        "in which the calling thread works. The other columns count calls of wgpu a picture, "
+        "of all threads: what is run, waited for and made."
+    )
+    return Table("Videos", columns, rows, note)
+
+
 def _bars(figures: Sequence[BenchFigure]) -> list[Bars]:
     """The parts of a call by method, for each size and number of samples."""
     bars: dict[tuple[Any, ...], Bars] = {}
     for f in figures:
         title = f"Time of a frame, {f.width} x {f.height}, {f.samples} samples"
         one = bars.setdefault((f.size, f.samples), Bars(title, "ms", {}))
-        parts = {"upload": f.upload, "GPU": f.gpu, "readback": f.readback}
+        parts = {"upload": f.upload, "frame": f.wall, "readback": f.readback}
         one.rows[f.method] = {name: ms for name, ms in parts.items() if ms is not None}
     return list(bars.values())
 
@@ -131,7 +172,7 @@ def _curves(figures: Sequence[BenchFigure]) -> list[Plot]:
         for f in figures:
             if f.samples == counts[len(counts) // 2]:
                 pixels = f.width * f.height
-                curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.gpu / pixels))
+                curves.setdefault(f.method, []).append((pixels / 1e6, 1e6 * f.wall / pixels))
         title = f"Time per pixel, {counts[len(counts) // 2]} samples"
         plots.append(Plot(title, "megapixels", "ns per pixel", curves))
     if len(counts) > 1:
@@ -139,7 +180,7 @@ def _curves(figures: Sequence[BenchFigure]) -> list[Plot]:
         curves = {}
         for f in figures:
             if (f.width, f.height) == (width, height):
-                curves.setdefault(f.method, []).append((f.samples, f.gpu))
+                curves.setdefault(f.method, []).append((f.samples, f.wall))
         plots.append(Plot(f"Time against samples, {width} x {height}", "samples", "ms", curves))
         plots += _pass_curves([f for f in figures if f.size == (width, height)])
     return plots

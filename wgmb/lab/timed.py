@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import statistics
 import time
 from dataclasses import replace
 from typing import Any
@@ -28,17 +29,32 @@ class Timed:
     def __init__(self, blur: Blur, clock: timing.Clock, size: tuple[int, int]):
         self.blur, self.clock, self._held = blur, clock, _held()
         self.images = TexturePool(blur.device)
-        self.output = self.images.texture("output", size, blur.output)
+        self.output = self.images.view("output", size, blur.output)
         self.memory, self.runs, self.counts = 0, [], {}
+        self.records: list[float] = []  # seconds in which the calling thread recorded each frame
 
     def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None) -> None:
         """One frame, as the method draws it."""
         raise NotImplementedError
 
+    @property
+    def record(self) -> float | None:
+        """Seconds of a recording; None if it waits."""
+        return None
+
+    def gpu(self) -> float:
+        """Seconds of the GPU's work for a frame, without the recording."""
+        raise NotImplementedError
+
     def work(self) -> None:
-        """All passes at once."""
-        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        """A frame, from its recording to the end of the work."""
+        timing.work(self.blur.device, self._recorded)
         self.memory = self.memory or _held() - self._held
+
+    def _recorded(self, encoder: wgpu.GPUCommandEncoder) -> None:
+        began = time.perf_counter()  # recording never waits
+        self.draw(encoder, None)
+        self.records.append(time.perf_counter() - began)
 
     def passes(self) -> None:
         """All passes, each timed by itself."""
@@ -61,13 +77,17 @@ class TimedScene(Timed):
 
     def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None):
         """One frame of the scene."""
-        self._render.draw(self.output.create_view(), 0.0, timing=clock)
+        self._render.draw(self.output, 0.0, timing=clock)
+
+    def gpu(self) -> float:
+        """The sum of its passes: a scene submits them by itself, in portions."""
+        return sum(timing.medians(self.runs[1:] or self.runs).values())
 
 
 class TimedFrame(Timed):
     """A method of pictures, on one frame."""
 
-    parts = ("passes", "call")
+    parts = ("passes", "call", "span")
 
     def __init__(self, blur: Blur, clock: timing.Clock, frame: Frame):
         super().__init__(blur, clock, frame.size)
@@ -76,14 +96,27 @@ class TimedFrame(Timed):
             near = {"prev": replace(frame, number=-1), "next": replace(frame, number=1)}
             self.frame = replace(frame, **near)
         self.views = blur.upload(self.frame)
-        self.bytes = _bytes(self.views, self.output)
+        self.bytes = _bytes(self.views, self.output.texture)
         self.calls: list[tuple[float, float, float]] = []
+        self.spans: list[float] = []
         self.work()
 
     def draw(self, encoder: wgpu.GPUCommandEncoder, clock: timing.Clock | None):
         """One frame, from its textures."""
-        output = self.output.create_view()
-        self.blur.encode(encoder, output=output, timing=clock, **self.views)
+        self.blur.encode(encoder, output=self.output, timing=clock, **self.views)
+
+    def span(self) -> None:
+        """All passes as they are drawn, timed together."""
+        self.spans.append(self.clock.span(self._recorded))
+
+    @property
+    def record(self) -> float:
+        """The median of all recordings but the first one, which compiles."""
+        return statistics.median(self.records[1:] or self.records)
+
+    def gpu(self) -> float:
+        """The median of the spans."""
+        return statistics.median(self.spans[1:] or self.spans)
 
     def call(self) -> None:
         """Arrays in, array out, in three parts: to textures, all passes, back to an array."""
@@ -91,9 +124,9 @@ class TimedFrame(Timed):
         self.views = self.blur.upload(self.frame)
         timing.work(self.blur.device, lambda encoder: None)  # waits
         uploaded = time.perf_counter()
-        timing.work(self.blur.device, lambda encoder: self.draw(encoder, None))
+        timing.work(self.blur.device, self._recorded)
         drawn = time.perf_counter()
-        self.images.download(self.blur.device.create_command_encoder(), self.output)
+        self.images.download(self.blur.device.create_command_encoder(), self.output.texture)
         ends = time.perf_counter()
         self.calls.append((uploaded - began, drawn - uploaded, ends - drawn))
 

@@ -28,6 +28,7 @@ def bench(
     *,
     methods: str | None = None,
     samples: str = "16",
+    flow: str | None = None,
     size: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     rounds: int = 9,
     seconds: float = 60.0,
@@ -38,11 +39,13 @@ def bench(
     adapter: Adapter = None,
     quiet: Quiet = False,
 ) -> int:
-    """Time methods on this machine: median milliseconds per frame, transfers apart.
+    """Time methods and videos on this machine: median milliseconds per frame, transfers apart.
 
     Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 
     Example: wgmb bench --methods all --size 960x540 1920x1080 3840x2160 --samples 4,16,64
+
+    Example: wgmb bench --flow none,dis,search:draft
 
     Ctrl-C stops early and reports the measurements so far.
 
@@ -53,6 +56,9 @@ def bench(
         frames. The others are timed on a built-in scene.
     samples
         Sample counts, separated by commas.
+    flow
+        NAME[:QUALITY]..., separated by commas, such as none,dis,search:fast: sources of motion by
+        which pictures of a video are timed, too; auto unless --methods is set.
     size
         Image sizes; 1920x1080 by default.
     rounds
@@ -76,6 +82,7 @@ def bench(
     from ...lab import baselines, bench_report
     from ...lab.bench import bench as measure
     from ...lab.bench_figures import Bench
+    from ...lab.video_bench import flow_settings
 
     device, sizes = gpu.open_device(adapter), [size_of(text) for text in size or ["1920x1080"]]
     if article:
@@ -84,8 +91,11 @@ def bench(
             _tell_article(baselines.bench_torusphere(blur, width, height, rounds), width, height)
         return 0
     candidates = [Candidate(name) for name in METHODS]
+    flows = list(dict.fromkeys(flow.split(","))) if flow else [] if methods else ["auto"]
+    for one in flows:
+        flow_settings(one, device)
     if methods is None:
-        candidates = [c for c in candidates if not c.needs_scene]
+        candidates = [c for c in candidates if not c.needs_scene and not flow]
     elif methods != "all":
         candidates = [Candidate.parse(text) for text in methods.split(",")]
     if wrong := [c for c in candidates if c.samples]:
@@ -102,7 +112,8 @@ def bench(
         raise InputError(f"no such folder: {save.parent}")
     counts = whole_numbers("samples", samples)
     before = Bench.load(against) if against else None
-    run = measure(device, candidates, sizes, counts, rounds, seconds, Console(quiet).say_running)
+    say = Console(quiet).say_running
+    run = measure(device, candidates, sizes, counts, rounds, seconds, say, flows)
     if save:
         run.save(save)
     for line in bench_report.text(run).splitlines():
