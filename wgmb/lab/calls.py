@@ -13,7 +13,8 @@ from wgpu.backends.wgpu_native import _api
 
 from ..gpu import FrameBindings, Tape
 
-_P, _R = ParamSpec("_P"), TypeVar("_R")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 KINDS: dict[str, list[tuple[type, str]]] = {
     "dispatches": [
