@@ -2,8 +2,10 @@
 
 import json
 import re
+import runpy
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -346,3 +348,48 @@ def test_all_methods_are_timed_when_all_are_asked_for(tmp_path, capsys):
     assert (code, err) == (0, "")
     run = bench_figures.Bench.load(tmp_path / "a.json")
     assert [f.method for f in run.figures] == list(METHODS)
+
+
+# ---- tools/speed/gpu_check.py, of which lavapipe runs every part with tiny pictures -------------
+
+CHECK = Path(__file__).parents[2] / "tools" / "speed" / "gpu_check.py"
+
+
+@pytest.mark.full
+def test_a_gpu_is_checked_in_one_run(tmp_path, capsys):
+    tool = runpy.run_path(str(CHECK))
+    assert tool["main"](["reference", str(tmp_path / "refs.npz")]) == 0
+    words = ["check", str(tmp_path), "--refs", str(tmp_path / "refs.npz"), "--quick"]
+    assert tool["main"](words) == 0
+    kept = json.loads((tmp_path / "check.json").read_text())
+    assert (kept["left out"], kept["failed"]) == ([], {})
+    assert kept["device"]["adapter"] and kept["waits"]["wait ms"] > 0
+    said = capsys.readouterr().out
+    for method in tool["METHODS"]:
+        one = kept[f"{method}, 64 x 36"]
+        assert min(one["record"], one["wall"], one["in a row"], one["asked"]["passes"]) > 0
+        assert f"| {method}, 64 x 36 |" in said
+    for flow in tool["FLOWS"]:
+        assert kept[f"video by {flow}"]["counts"]["submits"] > 0
+        assert f"| video by {flow} |" in said
+    assert {one["largest"] for one in kept["references"].values()} == {0.0}  # the same adapter
+
+
+def test_parts_of_a_check_that_fail_or_have_no_time_are_named(tmp_path, capsys):
+    tool = runpy.run_path(str(CHECK))
+    check = tool["check"]
+
+    def parts(device, options):
+        yield "fails", lambda: 1 / 0
+        yield "runs", lambda: {"rate": 2.0, "thread": 1.0, "counts": dict.fromkeys(
+            ("passes", "submits", "waits", "groups", "buffers", "textures"), 3.0)}  # fmt: skip
+
+    check.__globals__["parts_of"] = parts
+    assert tool["main"](["check", str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    assert "| runs | 2.0 | 1.0 | 3.0 |" in said and "Failed: fails." in said
+    assert (
+        "ZeroDivisionError" in json.loads((tmp_path / "check.json").read_text())["failed"]["fails"]
+    )
+    assert tool["main"](["check", str(tmp_path), "--seconds", "0"]) == 0
+    assert "Left out: fails, runs." in capsys.readouterr().out

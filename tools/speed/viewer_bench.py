@@ -1,6 +1,6 @@
 """The time until the viewer shows what is set, and for which its panel stands still meanwhile.
 
-    xvfb-run -s '-screen 0 1920x1080x24' python tools/viewer_bench.py [--inline]
+    xvfb-run -s '-screen 0 1920x1080x24' python tools/speed/viewer_bench.py [--inline]
         [--size WxH] [SUBJECT ...]
 
 SUBJECT: scene, frames (1920 x 1080, with depth), video (1280 x 720). For each the window is opened

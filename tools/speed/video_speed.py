@@ -1,8 +1,8 @@
 """The cost of `wgmb blur --flow none` beside that of the decoder and the encoder alone.
 
-    python tools/video_speed.py                     a clip made for it: 1080p, 240 to 60
-    python tools/video_speed.py clip.mp4 --fps 60   another one
-    python tools/video_speed.py --rounds 5          medians of so many rounds; 3 by default
+    python tools/speed/video_speed.py                     a clip made for it: 1080p, 240 to 60
+    python tools/speed/video_speed.py clip.mp4 --fps 60   another one
+    python tools/speed/video_speed.py --rounds 5          medians of so many rounds; 3 by default
 
 Codecs alone: PyAV decodes every picture of the clip, and encodes the same pictures as wgmb, which
 lie in memory, with its settings. Start: wgmb with four pictures. Without the start: the difference
@@ -24,7 +24,7 @@ import time
 from fractions import Fraction
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import av  # noqa: E402
