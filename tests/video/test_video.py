@@ -91,6 +91,17 @@ def test_a_gif_has_colours_of_its_own_in_every_frame_and_dithers(tmp_path):
             assert apart(shown, want) < 0.7 * apart(flat, want)
 
 
+def test_a_gif_shows_a_picture_whose_palette_was_there_before(tmp_path):
+    """FFmpeg compared indices with those of the picture before, which had another palette."""
+    colors = [(0, 0, 1), (1, 1, 0), (0, 0, 1), (1, 1, 0)]
+    written(tmp_path / "v.gif", [np.full((12, 16, 3), color, "f4") for color in colors], 10)
+    with Image.open(tmp_path / "v.gif") as image:
+        for n, color in enumerate(colors):
+            image.seek(n)
+            shown = np.asarray(image.convert("RGB"), int)
+            assert np.abs(shown - np.array(color) * 255).max() <= 2
+
+
 def apart(got: Image.Image, want: Image.Image) -> float:
     difference = np.asarray(got, "f4") - np.asarray(want, "f4")
     return float(np.abs(sliding_window_view(difference, (4, 4), (0, 1)).mean((-1, -2))).mean())

@@ -159,7 +159,8 @@ CODECS = {
                          *_planar("yuva422p yuva444p", (12,)), "yuv440p", "yuv411p", "yuv410p"),
                 "", (("level", "3"), ("slicecrc", "1"), ("g", "1"))),
     ),
-    "gif": Codec((".gif",), Encoder("gif", ("pal8",))),
+    # Its differences from the picture before are of indices, also where the palette is another.
+    "gif": Codec((".gif",), Encoder("gif", ("pal8",), options=(("gifflags", "0"),))),
 }  # fmt: skip
 
 
