@@ -14,6 +14,7 @@ from PIL import Image, features
 import make_clips as clips
 from wgmb import InputError, blur_video
 from wgmb.cli.app import main
+from wgmb.cli.commands.info_video import describe_video
 from wgmb.io.pipes import STDOUT
 from wgmb.run.pipe import blur_pipe
 from wgmb.run.video import VideoRequest
@@ -199,10 +200,19 @@ SPHERES = {
 }
 
 
+SHAPES = {"whole": "360", "turned": "360", "part": "part of a sphere", "cube": "360 degrees (cube)"}
+
+
 @pytest.mark.parametrize("kind", ["mkv", "mp4"])
 @pytest.mark.parametrize(
     ("to", "codec"),
-    [("mkv", "h264"), ("mp4", "h264"), ("mp4", "av1"), ("mkv", "ffv1"), ("webm", "vp9")],
+    [
+        ("mkv", "h264"),
+        ("mp4", "h264"),
+        pytest.param("mp4", "av1", marks=pytest.mark.full),
+        ("mkv", "ffv1"),
+        pytest.param("webm", "vp9", marks=pytest.mark.full),
+    ],
 )
 @pytest.mark.parametrize("sphere", SPHERES)
 def test_360_degrees_are_kept(tmp_path, sphere, kind, to, codec):
@@ -217,6 +227,7 @@ def test_360_degrees_are_kept(tmp_path, sphere, kind, to, codec):
     assert report.left_out == []
     reader = VideoReader(path)
     assert reader.projection == wanted
+    assert dict(describe_video(reader))["sphere"].startswith(SHAPES[sphere])
     assert len(list(reader)) == len(VideoReader(source)) == 8 and not reader.loss()
 
 
@@ -231,6 +242,8 @@ def test_two_views_are_kept_or_said(tmp_path, mode, to):
     is_held = to == "mkv" or (to == "mp4" and mode in ("left_right", "top_bottom"))
     said = f"that it has two views ({mode.replace('_', ' ')}) is not kept (.mkv holds most)"
     assert (said in report.left_out) != is_held
+    views = dict(describe_video(VideoReader(source)))["views"]
+    assert views == f"two in a picture: {mode.replace('_', ' ')}"
     reader = VideoReader(tmp_path / f"b.{to}")
     assert len(list(reader)) == 8
     if is_held:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...color.coding import Coding
 from ...video.read.reader import VideoReader
 from ...video.scan import scan_video
+from ...video.write.views import described
 from ..console import Console
 from ..exit_codes import DONE, SOME_FAILED
 from ..terminal import out
@@ -82,6 +83,7 @@ def describe_video(reader: VideoReader) -> list[tuple[str, str]]:
         lines.append(("pixels", f"{reader.pixel_aspect} times as wide as high"))
     if reader.rotation:
         lines.append(("rotation", f"turned by {reader.rotation} degrees to be upright"))
+    lines += described(reader.facts).items()
     if reader.times[0]:
         lines.append(("begins", f"at {float(reader.times[0]):.3f} s"))
     for stream in reader.streams:

@@ -31,6 +31,11 @@ _MODES = {
 _IN_MP4 = ("left_right", "top_bottom")
 _FLAT = 0  # kind of a picture of one view
 _WHOLE, _CUBE, _PART = 0, 1, 2  # kinds of projection that Matroska has
+_PROJECTIONS = {
+    _WHOLE: "360 degrees (equirectangular)", _CUBE: "360 degrees (cube)",
+    _PART: "part of a sphere (equirectangular)", 3: "half of a sphere (equirectangular)",
+    4: "none (rectilinear)", 5: "fisheye",
+}  # fmt: skip
 _PATH = (0x18538067, 0x1654AE6B, 0xAE, 0xE0)  # Segment, Tracks, TrackEntry, Video
 _APPLE = re.compile(rb"\0\0\0.(vexu)\0\0\0.(?:eyes\0\0\0.stri|proj\0\0\0.prji)", re.DOTALL)
 _FIXED = 1 << 16  # to a degree
@@ -49,17 +54,35 @@ def are_stated(facts: Facts) -> bool:
     return bool(_projection(facts) or stereo_mode(facts))
 
 
+def described(facts: Facts) -> dict[str, str]:
+    """The projection and the two views of pictures, in words."""
+    said = {}
+    if facts.projection is not None:
+        kind = _SPHERICAL.unpack_from(facts.projection)[0]
+        said["sphere"] = _PROJECTIONS.get(kind, "unknown projection")
+    if _has_two_views(facts):
+        said["views"] = f"two in a picture: {_arrangement(facts)}"
+    return said
+
+
 def left_out(facts: Facts, suffix: str) -> list[str]:
     """Such facts that a container does not hold, in words."""
     said, mode, is_mkv = [], stereo_mode(facts), suffix in (".mkv", ".webm")
     held = is_mkv or suffix == ".mp4" or (suffix == ".mov" and _is_upright_sphere(facts))
     if facts.projection is not None and not (held and _projection(facts)):
         said.append("its projection (360 degrees) is not kept (.mkv and .mp4 hold most)")
-    is_flat = facts.stereo is None or _STEREO.unpack_from(facts.stereo)[0] == _FLAT
-    if not is_flat and not (mode and (is_mkv or (suffix == ".mp4" and mode in _IN_MP4))):
-        name = mode.replace("_", " ") or "of unknown arrangement"
-        said.append(f"that it has two views ({name}) is not kept (.mkv holds most)")
+    held = mode and (is_mkv or (suffix == ".mp4" and mode in _IN_MP4))
+    if _has_two_views(facts) and not held:
+        said.append(f"that it has two views ({_arrangement(facts)}) is not kept (.mkv holds most)")
     return said
+
+
+def _has_two_views(facts: Facts) -> bool:
+    return facts.stereo is not None and _STEREO.unpack_from(facts.stereo)[0] != _FLAT
+
+
+def _arrangement(facts: Facts) -> str:
+    return stereo_mode(facts).replace("_", " ") or "of unknown arrangement"
 
 
 def stream_after(to: OutputContainer, sample: bytes, facts: Facts) -> VideoStream:
