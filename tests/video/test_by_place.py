@@ -118,6 +118,20 @@ def test_blocks_find_a_body_that_dense_inverse_search_loses():
     assert np.abs(first - [-48, 0, 48, 0]).max() < 2
 
 
+@pytest.mark.parametrize("kind", ["textured", "moving"])
+@pytest.mark.parametrize("is_last", [False, True])
+def test_ground_that_the_only_neighbour_hides_moves_like_all_else(kind, is_last):
+    """A body of 40 px hides it there, and nothing in that picture is like it."""
+    pictures = [p[..., 1].copy() for p in shot(48, 40, kind)]
+    near = [pictures[3], pictures[4], None] if is_last else [None, pictures[0], pictures[1]]
+    motion = ByPlace().motion(near)
+    pan, middle = 3 if kind == "moving" else 0, 208 if is_last else 112
+    hidden = motion[HEIGHT // 2 - 14 : HEIGHT // 2 + 14, middle - 14 : middle + 10, 2]
+    body = motion[HEIGHT // 2 - 10 : HEIGHT // 2 + 10, middle + (38 if is_last else -58) :][:, :20]
+    assert (np.abs(hidden + pan) < 1).mean() > 0.8
+    assert np.abs(body[..., 2] - 48).max() < 2
+
+
 def test_motion_is_as_dense_inverse_search_finds_it_where_all_moves_alike():
     """At the border, where that sees half of it, it goes on like all else."""
     wide = texture(WIDTH + 60, HEIGHT, 9, 3)

@@ -73,6 +73,12 @@ class Reduced:
         at = self._x + way[..., 0], self._y + way[..., 1]
         return _cv().remap(plane, *at, _cv().INTER_LINEAR, borderMode=_cv().BORDER_REPLICATE)
 
+    def places(self, way: np.ndarray) -> np.ndarray:
+        """Indices, row by row, of the pixels that the ways (height, width, 2) [px] lead to."""
+        at = self._x + way[..., 0], self._y + way[..., 1]
+        x, y = (np.rint(n).clip(0, most - 1) for n, most in zip(at, self.size, strict=True))
+        return (y * self.size[0] + x).astype(np.intp)
+
     def differences(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Those to the neighbour that fits better and to the other, means of 3 x 3 pixels.
 

@@ -12,6 +12,7 @@ from .homographies import homography_of, ways_of
 from .inverse_search import Pictures
 
 _APART = 0.5  # px of the level, by which a motion differs that is not the dominant one
+_SAME = 2.0  # px of the level: places beside each other may lead to one place
 
 
 def _cv() -> Any:
@@ -24,7 +25,8 @@ def with_dominant(pictures: Pictures, motion: np.ndarray) -> np.ndarray:
 
     On flat ground and in patterns that repeat, a search finds one motion as well as another. A
     region keeps its motion if the dominant one fits worse anywhere in it, and so does a picture
-    that is smaller than a block.
+    that is smaller than a block. Where a picture has one neighbour alone, places that are hidden
+    there take the dominant motion, too.
     `motion`: of the picture (height, width, 4) [px], which is changed.
     """
     level = Reduced(pictures, HALF)
@@ -39,12 +41,34 @@ def with_dominant(pictures: Pictures, motion: np.ndarray) -> np.ndarray:
     calm = np.stack(led, axis=2) / np.float32(level.factor)
     differs = np.abs(state - calm).max(axis=2) > _APART
     worse = level.differences(calm)[0] - level.differences(state)[0] > UNFIT
+    if len(level.sides) == 1:
+        hidden = _hidden(level, state, calm)
+        _put(motion, dominant, level, differs & hidden, np.array([0, 0, *level.size]))
+        differs &= ~hidden
     _, labels, boxes, _ = _cv().connectedComponentsWithStats(differs.astype(np.uint8))
     keeps = np.zeros(len(boxes), bool)
     keeps[labels[worse]] = keeps[0] = True
     for label in np.flatnonzero(~keeps):
         _put(motion, dominant, level, labels == label, boxes[label])
     return motion
+
+
+def _hidden(level: Reduced, state: np.ndarray, dominant: np.ndarray) -> np.ndarray:
+    """(height, width) bool: places that another place hides in the only neighbour.
+
+    Where their motion and the dominant one lead, others lead and fit better.
+    """
+    (side,) = level.sides
+    way, cost = way_of(state, side).reshape(-1, 2), level.cost(state)
+    first = np.full(cost.size, -1)  # the place that leads to each and fits best
+    order = np.argsort(-cost, axis=None, kind="stable")
+    first[level.places(way_of(state, side)).flat[order]] = order
+    hidden = np.ones(cost.shape, bool)
+    for one in (state, dominant):
+        other = first[level.places(way_of(one, side))]
+        apart = np.abs(way_of(one, side) - way[other]).max(axis=2) > _SAME
+        hidden &= (other >= 0) & apart & (level.cost(one) - cost.flat[other] > 0)
+    return _cv().medianBlur(hidden.astype(np.uint8), 5) > 0
 
 
 def _put(
