@@ -7,11 +7,12 @@ import tracemalloc
 import zlib
 
 import numpy as np
+import OpenEXR
 import pytest
 import tifffile
-from PIL import Image
+from PIL import Image, JpegImagePlugin
 
-from wgmb import InputError
+from wgmb import Clip, InputError
 from wgmb.io import stills
 
 pytestmark = pytest.mark.fast
@@ -178,3 +179,40 @@ def test_jpegs_with_profiles_and_texts_are_read_as_without(tmp_path):
         shown.save(stream, "jpeg", quality=90, restart_marker_rows=1, **options)
         (tmp_path / name).write_bytes(stream.getvalue())
     assert np.array_equal(stills.read(tmp_path / "a.jpg"), stills.read(tmp_path / "b.jpg"))
+
+
+FLAT = 1500, 1000  # px, of one colour: 24 MB of light, and 150 MB where its motion is searched
+LAYERS = {"picture": "RGB", "motion": ("R", "G", "B", "Vector.X", "Vector.Y")}
+
+
+def write_flat(path, layers="picture") -> None:
+    """A file of a few KB, whose last pixels are damaged."""
+    grey = np.full(FLAT[::-1], 51, np.uint8)
+    if path.suffix == ".exr":
+        plane = np.full(FLAT[::-1], 0.2, np.float16)
+        OpenEXR.File({}, dict.fromkeys(LAYERS[layers], plane)).write(str(path))
+    elif path.suffix == ".tif":
+        options = {"compression": "zlib", "rowsperstrip": FLAT[1], "photometric": "rgb"}
+        tifffile.imwrite(path, np.stack([grey] * 3, axis=2), **options)
+    else:
+        Image.fromarray(grey).convert("RGB").save(path, quality=50)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".tif", ".exr"])
+def test_a_picture_whose_motion_would_take_too_much_is_refused_by_its_header(
+    tmp_path, suffix, monkeypatch
+):
+    monkeypatch.setattr(JpegImagePlugin.JpegImageFile, "load", lambda _: 1 // 0)
+    path = tmp_path / f"a.0001{suffix}"
+    write_flat(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2] + bytes(len(data) // 2 - 64) + data[-64:])
+    with pytest.raises(InputError, match=r"to blur its pictures of 1500 x 1000 takes 144 MB"):
+        Clip(str(path), max_mb=400).source(1)
+    with pytest.raises(InputError, match=r"damaged|not a readable image|could be read"):
+        Clip(str(path), max_mb=577).source(1)
+
+
+def test_a_frame_with_vectors_is_judged_by_its_own_pixels(tmp_path):
+    write_flat(tmp_path / "a.0001.exr", "motion")
+    assert Clip(str(tmp_path / "a.0001.exr"), max_mb=400).source(1).size == FLAT

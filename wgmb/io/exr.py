@@ -99,12 +99,15 @@ def read(
     header_only: bool = False,
     max_mb: float = limits.MAX_MB,
     data_layers: Collection[str] = (),
+    held: Callable[[Collection[str]], int] | None = None,
 ) -> Exr:
     """Read `path`; `header_only` leaves every channel an empty array.
 
     Deep pixels are flattened, luminance and chroma become R, G and B, and of tiles' levels the
     largest is read; the part's `notes` say so. `max_mb`: megabytes that its pixels may take.
-    `data_layers`: layers of deep pixels that hold no colours (see `deep.flatten`).
+    `data_layers`: layers of deep pixels that hold no colours (see `deep.flatten`). `held`: told
+    the names of the channels, returns the values of 32 bits that a run holds of a pixel (see
+    limits.check_held).
     `InputError` names the file where it is missing, damaged, cut off, absurdly large or beyond
     that limit, and where memory is short.
     """
@@ -127,7 +130,11 @@ def read(
     if any(is_deep):
         needed += deep.needed(path, header.parts)
         what += " deep,"
-    limits.check(path, what, needed, path.stat().st_size, max_mb)
+    stored = path.stat().st_size
+    limits.check(path, what, needed, stored, max_mb)
+    if held is not None:
+        each = held(list(Exr(path, promised).channels()))
+        limits.check_held(path, promised[0].size, each, stored, max_mb)
     with inside(), hushed() as heard:
         content, _ = _open(path, header_only=False)
     if len(content.parts) != len(promised):

@@ -57,16 +57,20 @@ def _tifffile():
 
 
 def read(
-    path: str | Path, *, max_mb: float = limits.MAX_MB, space: ColorSpace | None = None
+    path: str | Path,
+    *,
+    max_mb: float = limits.MAX_MB,
+    space: ColorSpace | None = None,
+    held: int = 0,
 ) -> np.ndarray:
     """(height, width, 3 or 4) float32, linear, premultiplied.
 
     `max_mb`: megabytes that it may unpack to. `space`: of the samples, instead of sRGB or, of
-    floats, linear light; the result is in `space.config.scene_linear`. `InputError`
-    names the file where it is missing, damaged, cut off, no picture or beyond that limit, and
-    where memory is short.
+    floats, linear light; the result is in `space.config.scene_linear`. `held`: values of 32 bits
+    that a run holds of a pixel (see limits.check_held). `InputError` names the file where it is
+    missing, damaged, cut off, no picture or beyond that limit, and where memory is short.
     """
-    return _decoded(Path(path), max_mb, lambda samples: _to_linear(samples, space))
+    return _decoded(Path(path), max_mb, held, lambda samples: _to_linear(samples, space))
 
 
 def samples(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
@@ -74,10 +78,12 @@ def samples(path: str | Path, *, max_mb: float = limits.MAX_MB) -> np.ndarray:
 
     Grey of a PNG is repeated in three channels. The rest is as for `read`.
     """
-    return _decoded(Path(path), max_mb, _checked)
+    return _decoded(Path(path), max_mb, 0, _checked)
 
 
-def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def _decoded(
+    path: Path, max_mb: float, held: int, convert: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
     """The file's samples, converted; every failure is an InputError that names the file."""
     if not path.is_file():
         raise bounded.missing(path)
@@ -86,7 +92,9 @@ def _decoded(path: Path, max_mb: float, convert: Callable[[np.ndarray], np.ndarr
         if width < 1 or height < 1:
             raise ValueError(f"{width} x {height} pixels")
         unpacked = max(limits.unpacked((width, height), 4), segments)
-        limits.check(path, f"{width} x {height}", unpacked, path.stat().st_size, max_mb)
+        stored = path.stat().st_size
+        limits.check(path, f"{width} x {height}", unpacked, stored, max_mb)
+        limits.check_held(path, (width, height), held, stored, max_mb)
 
     try:
         return convert(_READERS[path.suffix.lower()](path.read_bytes(), allow))

@@ -63,7 +63,15 @@ class FrameCache:
             passes, paths = self.passes, self.files.paths(number)
             names, titles = self.files.view_names, self.files.titles
             found = read(
-                paths, number, passes.color, self._max_mb, names, self._space, passes.layers, titles
+                paths,
+                number,
+                passes.color,
+                self._max_mb,
+                names,
+                self._space,
+                passes.layers,
+                titles,
+                is_blurred=True,
             )
             if self._space is not None:
                 found = tuple(in_space(source, self._space) for source in found)

@@ -209,6 +209,7 @@ def read(
     space: ColorSpace | None = None,
     layers: Sequence[str] = (),
     titles: Sequence[str] = ("",),
+    is_blurred: bool = False,
 ) -> tuple[FrameFile, ...]:
     """Every view of a frame, the default one first; the channels of its files together.
 
@@ -220,10 +221,12 @@ def read(
     views, if %V stands for them in the first path; else that file tells them. In the other paths
     %V stands for them too; of a file without %V and without views, they are the default view's.
     `space`: of the samples of a still (stills.read) that is the first path. `layers`: names of
-    layers that may begin with a part's (see views.by_view).
+    layers that may begin with a part's (see views.by_view). `is_blurred`: a picture alone is
+    refused by its header where a search for its motion would hold too much of it.
     `InputError` names the file that is missing, damaged, too large, or of another size.
     """
-    files = _Files(max_mb, (*layers, *((wanted,) if wanted else ())))
+    is_searched = is_blurred and len(paths) == 1
+    files = _Files(max_mb, (*layers, *((wanted,) if wanted else ())), is_searched)
     first = files.content(in_view(paths[0], named[0] if named else None), space)
     full = tuple(view for view in first.named if first.views[view])
     there = tuple(named) or full or (None,)
@@ -277,8 +280,9 @@ class _Content:
 class _Files:
     """The files of one frame, each read once."""
 
-    def __init__(self, max_mb: float, layers: Sequence[str]):
-        self._max_mb, self._layers = max_mb, layers
+    def __init__(self, max_mb: float, layers: Sequence[str], is_searched: bool):
+        """`is_searched`: the motion of a picture without other layers is searched."""
+        self._max_mb, self._layers, self._is_searched = max_mb, layers, is_searched
         self._read: dict[Path, _Content] = {}
 
     def content(self, path: Path, space: ColorSpace | None, title: str = "") -> _Content:
@@ -290,7 +294,8 @@ class _Files:
     def _content(self, path: Path, space: ColorSpace | None, title: str) -> _Content:
         suffix = path.suffix.lower()
         if suffix == ".exr":
-            file = exr.read(path, max_mb=self._max_mb, data_layers=vectors.STEMS)
+            stems = vectors.STEMS
+            file = exr.read(path, max_mb=self._max_mb, data_layers=stems, held=self._held)
             unit = data_files.unit_of(record.content_of(file.parts[0].attributes.get(record.KEY)))
             return _Content(path, file, {}, stereo.by_view(file, self._layers), title, unit)
         if suffix == data_files.FLO:
@@ -300,12 +305,23 @@ class _Files:
             data = data_files.read(path, max_mb=self._max_mb)
             return _Content(path, None, data.planes, {}, title, data.unit)
         if suffix in stills.SUFFIXES:
-            rgba = stills.read(path, max_mb=self._max_mb, space=space)
+            held = self._held("RGB")
+            rgba = stills.read(path, max_mb=self._max_mb, space=space, held=held)
             planes = {c: rgba[..., i] for i, c in enumerate("RGBA"[: rgba.shape[2]])}
             return _Content(path, None, planes, {}, title)
         raise InputError(
             f"{path}: cannot read this kind of file; frames may be {', '.join(_SUFFIXES)}"
         )
+
+    def _held(self, channels: Collection[str]) -> int:
+        """Values of 32 bits that a run holds of a pixel of a file with these channels.
+
+        0 where it may have motion vectors.
+        """
+        with contextlib.suppress(InputError):
+            if self._is_searched and set(names.find_color(channels)) >= set(channels):
+                return limits.AVERAGED
+        return 0
 
 
 def _together(
