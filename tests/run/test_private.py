@@ -25,6 +25,7 @@ KINDS = {  # command, input, output
     "vectors": (("vectors", "--as", "nuke"), "shot", "o.####.exr"),
     "flo": (("vectors", "--as", "flo"), "shot", "o.####.flo"),
     "perceived frames": (("perceive",), "shot", "o.####.png"),
+    "job": (("job", "--method", "tap"), "shot", "o.####.exr"),
     "motion": (("info",), "shot", "o.png"),
     "video": (AVERAGE, "clip", "o.mp4"),
     "resumed video": ((*AVERAGE, "--resume"), "clip", "o.mkv"),
@@ -81,9 +82,22 @@ def test_a_result_is_readable_by_nobody_who_may_not_read_its_input(
         to = tmp_path / f"{mode:o}"
         to.mkdir()
         created.clear()
-        code, _, err = make.inside(capsys, *command, inputs[of], "-o", to / name)
+        log = () if command[0] in ("info", "job") else ("--log-json", to / "run.log")
+        job = ("-j", to / "j.json", "--slurm", to / "j.sh") if command[0] == "job" else ()
+        code, _, err = make.inside(capsys, *command, inputs[of], "-o", to / name, *log, *job)
         assert code == 0, err
         assert modes_in(to) == created == {mode}
+
+
+def test_a_log_is_its_owners_until_the_inputs_are_known(tmp_path, capsys, umask, inputs):
+    log = tmp_path / "run.log"
+    words = ("blur", "-o", tmp_path / "o.####.exr", "--log-json", log, "--method", "tap")
+    assert make.inside(capsys, *words, "--layer", "none", inputs["shot"])[0] == 2
+    assert stat.S_IMODE(log.stat().st_mode) == 0o600
+    log.chmod(0o644)  # one that was there is never opened wider, but closed
+    allow(tmp_path / "in", 0o640)
+    assert make.inside(capsys, *words, inputs["shot"])[0] == 0
+    assert stat.S_IMODE(log.stat().st_mode) == 0o640
 
 
 def test_one_private_frame_makes_its_own_result_private(tmp_path, umask, inputs):

@@ -1,7 +1,8 @@
 """`--log-json`: the events of a run for machines, a line of JSON each.
 
 docs/reference/files.md describes the events. A command opens its log before it does anything
-else, and app.py ends it with the exit code; there is one at most in a process.
+else, and app.py ends it with the exit code; there is one at most in a process. A new log is its
+owner's alone until the inputs are known, and then as private as they are.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import stat
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from .._version import __version__
 from ..errors import InputError
+from ..io.atomic import PUBLIC, mode_of
 from ..io.frame_numbers import frame_path
 from ..io.pipes import STDOUT
 from ..io.suffixes import VIDEOS
@@ -39,11 +42,27 @@ class _Log:
     command: str
     file: int | None
     """Descriptor of the file; None: standard output."""
+    most: int | None = None
+    """Permissions that the umask allows a new file; None: the file was there before."""
     begun: float = field(default_factory=time.perf_counter)
     last: float = field(default_factory=time.perf_counter)
     counts: dict[str, itertools.count[int]] = field(
         default_factory=lambda: {state: itertools.count() for state in STATES}
     )
+
+    def protect(self, made_of: Iterable[Path]) -> None:
+        """Let nobody read the file who may not read the inputs."""
+        if self.file is None or os.name == "nt":
+            return
+        found = os.fstat(self.file)
+        if not stat.S_ISREG(found.st_mode):
+            return
+        now = stat.S_IMODE(found.st_mode)
+        wanted = mode_of(Path(self.name).parent, made_of) & (
+            now if self.most is None else self.most
+        )
+        if wanted != now:
+            os.fchmod(self.file, wanted)
 
     def write(self, event: str, **content: Any) -> None:
         """Add a line; a log that cannot be written any more is told once, and the run goes on."""
@@ -75,23 +94,42 @@ def begin(name: str | None, command: str, output: str = "") -> None:
         return
     if name == STDOUT == output:
         raise InputError("--log-json and --output are both standard output; name a file for one")
-    _log = _Log(name, command, None if name == STDOUT else _opened(Path(name)))
+    _log = _Log(name, command, None) if name == STDOUT else _opened(Path(name), command)
 
 
-def _opened(path: Path) -> int:
+def _opened(path: Path, command: str) -> _Log:
+    flags = os.O_WRONLY | os.O_APPEND
+    umask = os.umask(0o077)
+    try:
+        file = os.open(path, flags | os.O_CREAT | os.O_EXCL, PUBLIC)
+    except FileExistsError:
+        pass
+    else:
+        return _Log(str(path), command, file, PUBLIC & ~umask)
+    finally:
+        os.umask(umask)
     if path.is_file():
         with open(path, "rb") as file:
             first = file.read(len(_BEGINNING))
         if first and first != _BEGINNING:
             raise InputError(f"--log-json {path}: the file is there and is no log; name another")
-    return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+    return _Log(str(path), command, os.open(path, flags | os.O_CREAT, 0o600))
 
 
 def start(
-    inputs: Sequence[str | Path], output: str | Path, settings: Mapping[str, Any], total: int | None
+    inputs: Sequence[str | Path],
+    output: str | Path,
+    settings: Mapping[str, Any],
+    total: int | None,
+    made_of: Iterable[str | Path] = (),
 ) -> None:
-    """Log the beginning of an output; `total`: number of frames, None if unknown."""
+    """Log the beginning of an output.
+
+    `total`: number of frames, None if unknown. `made_of`: the files that are read; the log is
+    readable by nobody who may not read them.
+    """
     if _log is not None:
+        _log.protect(map(Path, made_of))
         now = datetime.now(UTC).isoformat(timespec="seconds")
         _log.write(
             "start",

@@ -16,6 +16,7 @@ _OTHERWISE = {
     "device": "--adapter",
     "color_in": "--color-in",
     "fps_in": "--fps-in",
+    "nature": "--nature",
     "passes": "--passes",
     "form": "--as",
     "sharp": "--sharp",

@@ -25,6 +25,7 @@ from ..sequence.clip import Clip
 from ..sequence.data_windows import Placement, laid, union
 from ..sequence.frame_file import FrameFile
 from ..settings import InputSettings, OutputSettings, parameters_of, size_of
+from ..settings.groups import changed
 from ..settings.record import record
 from .settings import PerceptionSettings
 
@@ -112,6 +113,8 @@ class PerceptionRun:
 
     frames: PerceivedFrames
     output: Output
+    made_of: Sequence[Path] = ()
+    """The files that are read."""
 
     def __call__(self, progress: Progress | None = None) -> BatchReport:
         """Write the perceived image of each frame; the first error ends it."""
@@ -127,7 +130,11 @@ def perceive(
 ) -> PerceptionRun:
     """Frames of files, or of a scene of that name, as they are perceived."""
     fps, inputs = float(output.rate), ()
+    perception.check(of_scene=pattern in builtin.SCENES)
     if pattern in builtin.SCENES:
+        for name in changed(input):
+            if name != "frames":
+                raise InputError(f"`{name}` is for files, {pattern} is a scene")
         numbers = frame_numbers(input.frames or "0")
         steps = max(1, round(perception.nature / fps))
         scene = builtin.make(pattern, **parameters_of(perception.set))
@@ -137,7 +144,8 @@ def perceive(
         frames = PerceivedNature(render, observer, numbers, steps)
     else:
         clip = input.open(pattern)
-        inputs = clip.dependencies.every()
+        inputs = list(clip.dependencies.every())
         frames = PerceivedSequence(clip, Observer(fps, perception.cone, device=device))
     settings = record(perception, input=pattern, fps=str(output.rate))
-    return PerceptionRun(frames, output.make(settings, list(frames.numbers), inputs))
+    files = output.make(settings, list(frames.numbers), inputs)
+    return PerceptionRun(frames, files, inputs)

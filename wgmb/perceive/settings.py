@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 
 from ..cone import Cone
+from ..errors import InputError
+from ..settings.groups import changed
+
+_OF_SCENES = "nature", "size", "set"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +23,12 @@ class PerceptionSettings:
     "Scenes: width x height in pixels."
     set: tuple[str, ...] = ()
     "Scenes: parameter as NAME=VALUE; may be repeated."
+
+    def check(self, *, of_scene: bool) -> None:
+        """InputError for options of scenes, unless a scene is perceived."""
+        for name in () if of_scene else changed(self):
+            if name in _OF_SCENES:
+                raise InputError(f"`{name}` is for scenes")
 
     @property
     def cone(self) -> Cone:

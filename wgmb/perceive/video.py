@@ -18,7 +18,7 @@ from ..observer import Observer
 from ..run.engine import Blurred, Input, IsDone
 from ..run.report import Progress, VideoReport
 from ..run.video import check_fits
-from ..run.video_output import sounds_kept, write
+from ..run.video_output import check_output, sounds_kept, write
 from ..run.video_sink import Form
 from ..settings import BlurSettings, InputSettings, OutputSettings
 from ..settings.record import record
@@ -127,6 +127,8 @@ def perceive_video(
 ) -> PerceivedVideo:
     """A video as it is perceived; InputError for settings that do not fit."""
     check_fits(input, BlurSettings())
+    perception.check(of_scene=False)
+    check_output(output, VideoSettings(), path)
     if output.fps is not None:
         raise InputError("`fps` is for frames, the pictures of a video have their own times")
     reader = VideoReader(path, max_mb=input.max_mb)

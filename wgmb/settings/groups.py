@@ -33,6 +33,11 @@ GROUPS: dict[str, type] = get_type_hints(SettingsGroups)
 """The groups' types by their names."""
 
 
+def changed(settings: Any) -> list[str]:
+    """Names of the options of a group that are not as by default."""
+    return [f.name for f in fields(settings) if getattr(settings, f.name) != f.default]
+
+
 def groups_of(options: Mapping[str, Any]) -> SettingsGroups:
     """The groups that hold these options; names that are in none are left out."""
     return SettingsGroups(**{name: chosen(kind, options) for name, kind in GROUPS.items()})

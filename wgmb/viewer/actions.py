@@ -70,7 +70,7 @@ class Actions:
             return state
 
     def _save(self, path: Path, state: State) -> None:
-        write_file(path, state.toml().encode())
+        write_file(path, state.toml().encode(), mode=mode_of(path.parent, state.files))
         self._say(f"saved {path}")
 
     def _open(self, paths: list[str], state: State) -> State:

@@ -50,7 +50,8 @@ def blur_on_farm(job: Job, crew: Crew, console: Console, adapter: str | None = N
     job = as_farm_job(job)
     started = time.perf_counter()
     output = job.request.output.output
-    run_log.start([job.request.pattern], output, job.settings, len(job.numbers))
+    made_of = job.clip.dependencies.every()
+    run_log.start([job.request.pattern], output, job.settings, len(job.numbers), made_of)
     with console.progress(len(job.numbers)) as tick, muted():
         report = farm.blur(job, run_log.logged(tick, output))
     took = f"{time.perf_counter() - started:.1f} s with {job.request.blur.method}"
@@ -67,7 +68,8 @@ def blur_frames(
     console.detail(f"settings: {run.output.settings}")
     started = time.perf_counter()
     output = run.output.pattern
-    run_log.start([job.request.pattern], output, job.settings, len(run.numbers))
+    made_of = run.clip.dependencies.every()
+    run_log.start([job.request.pattern], output, job.settings, len(run.numbers), made_of)
     with console.progress(len(run.numbers)) as tick:
         report = run(run_log.logged(tick, output))
     if len(run.clip.numbers) < len(job.numbers):

@@ -15,6 +15,7 @@ from ...run.pipe import blur_pipe as run
 from ...run.video import VideoRequest
 from ...settings import OutputSettings
 from ...settings.record import record
+from ...video.holdouts import files_of
 from .. import run_log
 from ..console import Console, pictures_told
 from ..exit_codes import DONE, SOME_FAILED
@@ -35,7 +36,8 @@ def blur_pipe(
                          "ffmpeg -i in.mp4 -f yuv4mpegpipe - |")  # fmt: skip
 
     settings = record(request.blur, request.shutter, request.video)
-    run_log.start([source], output.output, settings, None)
+    made_of = source, *files_of(request.blur.holdout)
+    run_log.start([source], output.output, settings, None, made_of)
     with _stdout(output.output) as stdout:
         report = run(
             source, output, request, stdout=stdout, device=adapter, hints=hints,

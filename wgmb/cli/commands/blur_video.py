@@ -22,6 +22,7 @@ from ...run.trial.trial import Trial
 from ...run.video import VideoPlan, VideoRequest, VideoRun
 from ...settings import OutputSettings
 from ...settings.video import VideoSettings
+from ...video.holdouts import files_of
 from ...video.write.encoders import SUFFIXES, chosen
 from .. import run_log
 from ..console import Console, alone_told, pictures_told, repeats_told, unfollowed_told
@@ -48,7 +49,8 @@ def blur_videos(
         plan = run.plan(patterns[0], output)
         tell_how(run, console)
         console.say(*(f"{patterns[0]}: {text}" for text in plan.notes))
-        run_log.start(patterns, output.output, run.settings, len(plan.wanted))
+        made_of = *patterns, *files_of(request.blur.holdout)
+        run_log.start(patterns, output.output, run.settings, len(plan.wanted), made_of)
         if trial is not None:
             return _try_out(run, plan, trial, console)
         return _blur_alone(run, plan, console)
@@ -60,7 +62,8 @@ def blur_videos(
         _check_output(one, request.video)
     run = request.open(adapter)
     tell_how(run, console)
-    run_log.start(paths, output.output, run.settings, None)
+    made_of = *paths, *files_of(request.blur.holdout)
+    run_log.start(paths, output.output, run.settings, None, made_of)
     return _blur_each(run, paths, outputs, console)
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ...errors import InputError, counted
-from ...io.atomic import write_file
+from ...io.atomic import mode_of, write_file
 from ...io.frame_numbers import frame_list
 from ...run.job import settle
 from ...run.job_file import is_job, stored, time_there
@@ -125,7 +125,8 @@ def job(
         kept = replace(kept, job=replace(kept.job, since=since))
     texts[file] = kept.text()
     for path, text in texts.items():
-        write_file(path, text.encode())
+        mode = mode_of(path.parent, made.clip.dependencies.every())
+        write_file(path, text.encode(), mode=mode)
     console, finding = Console(quiet), made.findings.finding
     console.say(found.text, *made.remarks, f"vectors: {finding.text}" if finding.notable else "")
     frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"

@@ -21,6 +21,7 @@ from ...perceive.shutter_study import best_shutter, compare, perception_charts
 from ...scene import builtin
 from ...sequence.frame_file import is_video
 from ...settings import OutputSettings
+from ...settings.groups import changed
 from .. import run_log
 from ..console import Console, done_line
 from ..exit_codes import DONE, SOME_FAILED
@@ -77,6 +78,10 @@ def perceive(
             raise InputError("--log-json is for frames and videos; --report makes none")
         if pattern is not None:
             raise InputError(f"--report takes no input, got {pattern!r}")
+        perception.check(of_scene=False)
+        output.check()
+        for name in changed(input):
+            raise InputError(f"`{name}` is for files; --report takes none")
         return _report(output, perception, speed, console)
     run_log.begin(log_json, "perceive", output.output)
     if pattern is None:
@@ -94,7 +99,8 @@ def perceive(
         return _write_video(video, pattern, console)
     run = perceive_frames(pattern, output, input, perception, adapter)
     files = run.output
-    run_log.start([pattern], files.pattern, json.loads(files.settings), len(run.frames.numbers))
+    settings, count = json.loads(files.settings), len(run.frames.numbers)
+    run_log.start([pattern], files.pattern, settings, count, run.made_of)
     started = time.perf_counter()
     with console.progress(len(run.frames.numbers), "perceiving") as tick:
         made = run(run_log.logged(tick, files.pattern))
@@ -107,7 +113,7 @@ def _write_video(video: PerceivedVideo, path: str, console: Console) -> int:
     """Write a perceived video, and say so."""
     console.say(*(f"{path}: {text}" for text in video.reader.notes))
     target = video.output.output
-    run_log.start([path], target, video.settings, len(video.wanted))
+    run_log.start([path], target, video.settings, len(video.wanted), [path])
     with console.progress(len(video.wanted), "perceiving") as tick:
         report = video(run_log.logged_video(tick, target))
     console.say(*(f"{report.output}: {text}" for text in report.left_out))

@@ -82,7 +82,8 @@ def vectors(
     console.say(found.text, input.remark)
     console.detail(f"settings: {files.settings}")
     started = time.perf_counter()
-    run_log.start([pattern], files.pattern, json.loads(files.settings), len(clip.numbers))
+    made_of, settings = clip.dependencies.every(), json.loads(files.settings)
+    run_log.start([pattern], files.pattern, settings, len(clip.numbers), made_of)
     with console.progress(len(clip.numbers), "writing vectors") as tick:
         report = run(run_log.logged(tick, files.pattern))
     for number, count in sorted(files.clipped.items()):

@@ -28,7 +28,8 @@ class RecentFiles:
         self.sources = [whole, *(one for one in self.sources if one != whole)][:_MOST]
         with suppress(OSError):
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_file(self._path, json.dumps(self.sources, indent=1).encode())
+            text = json.dumps(self.sources, indent=1)
+            write_file(self._path, text.encode(), mode=0o600)
 
 
 def default_path() -> Path:
