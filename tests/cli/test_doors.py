@@ -1,5 +1,7 @@
 """One line that helps: outputs before inputs, near names, and inputs of another kind."""
 
+import subprocess
+
 import pytest
 
 import make_clips as clips
@@ -74,3 +76,84 @@ def test_a_folder_of_outputs_ends_in_a_slash(tmp_path, capsys, monkeypatch):
     clips.write(tmp_path / "clips" / "a.mp4")
     code, _, err = make.inside(capsys, "blur", "clips", "-o", "out")
     assert (code, "or a folder, whose name ends in /" in err) == (2, True)
+
+
+FRAMES = ("blur", "shot.####.exr", "-o", "o.####.exr")
+PICTURES = ("blur", "shot.####.exr", "-o", "o.####.png")
+FILM = ("blur", "shot.####.exr", "-o", "o.mp4")
+VIDEO = ("blur", "a.mp4", "-o", "o.mp4", "--flow", "none")
+STILLS = ("blur", "a.mp4", "-o", "o.####.png", "--flow", "none")
+PIPE = ("blur", "a.mp4", "-o", "-", "--flow", "none")
+OF_VIDEOS = {
+    "--begin": "0.1", "--end": "9", "--longest-pause": "3", "--speed": "0.5", "--pitch": "follow",
+    "--streams": "video", "--duplicates": "fill", "--codec": "h265", "--quality": "20",
+    "--encoder": "nvenc",
+}  # fmt: skip
+ENCODED = [(name, OF_VIDEOS[name]) for name in ("--codec", "--quality", "--encoder", "--streams")]
+OF_EXR = [("--layers", "picture"), ("--compression", "piz"), ("--window", "keep")]
+REFUSED = [
+    *((FRAMES, option, "is for input videos") for option in OF_VIDEOS.items()),
+    *((STILLS, option, "needs a video as output") for option in ENCODED),
+    *((STILLS, option, "needs an .exr output") for option in OF_EXR),
+    *((VIDEO, option, "needs an .exr output") for option in OF_EXR),
+    *((PICTURES, option, "needs an .exr output") for option in OF_EXR),
+    *((line, ("--bits", "16"), "needs a .png or .tif output") for line in (FRAMES, FILM, VIDEO)),
+    (PIPE, ("--bits", "16"), "needs a .png or .tif output"),
+    (PIPE, ("--streams", "video"), "a pipe carries pictures alone"),
+    (FRAMES, ("--object-motion",), "needs --camera"),
+    (FRAMES, ("--object-layer", "IndexOB"), "needs --camera"),
+    (("info", "a.mp4"), ("--layer", "x"), "is for rendered frames"),
+    (("info", "a.mp4"), ("--frames", "2"), "is for rendered frames"),
+    (("perceive", "a.mp4", "-o", "o.mp4"), ("--nature", "60"), "is for scenes"),
+    (("perceive", "a.mp4", "-o", "o.mp4"), ("--bits", "16"), "needs a .png or .tif output"),
+    (("perceive", "shot.####.exr", "-o", "o.####.exr"), ("--size", "64x36"), "is for scenes"),
+    (("perceive", "wheel", "-o", "o.exr"), ("--layer", "x"), "is for files, wheel is a scene"),
+    (("perceive", "--report", "-o", "o.svg"), ("--frames", "2"), "is for files"),
+    (("render", "wheel", "-o", "o.####.png", "--frames", "0-1"), ("--time", "1"),
+     "is for a single image"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def inputs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make.write_sequence(tmp_path, [1, 2])
+    clips.write(tmp_path / "a.mp4")
+    return tmp_path
+
+
+def test_an_option_without_a_use_is_refused(inputs, capsys):
+    for line, option, why in REFUSED:
+        code, _, err = make.inside(capsys, *line, *option)
+        assert (code, err.count("\n")) == (2, 1), (line, option, err)
+        assert option[0] in err and why in err, (line, option, err)
+    assert not list(inputs.glob("o.*"))
+
+
+NAMED = [
+    (FRAMES, ("--rolling-duration", "0.5"), "has no effect without --rolling"),
+    (FRAMES, ("--flow-quality", "fast"), "motion of their own, so --flow-quality has no effect"),
+    (("blur", "plain.####.exr", "-o", "o.####.exr", "--flow", "none", "--shutter", "720"),
+     ("--vector-scale", "2"), "no vectors, so --vector-scale has no effect"),
+    (VIDEO, ("--ocio", "FIFO"), "keep their own colours, so --ocio has no effect"),
+    (VIDEO, ("--from", "acescg"), "keep their own colours, so --from has no effect"),
+    (("info", "a.mp4"), ("--look", "x"), "keep their own colours, so --look has no effect"),
+    (("render", "wheel", "-o", "o.png", "--size", "16x9"), ("--rolling-duration", "2"),
+     "has no effect without --rolling"),
+]  # fmt: skip
+
+
+def test_an_option_that_changes_nothing_is_named(inputs, capsys):
+    for n in (1, 2, 3):
+        make.write_exr(inputs / f"plain.{n:04d}.exr", make.frame(n, None))
+    for line, option, said in NAMED:
+        more = () if line[0] == "info" else ("--overwrite",)
+        code, _, err = make.inside(capsys, *line, *option, *more)
+        assert code == 0 and said in err, (line, option, err)
+
+
+def test_a_pipe_names_an_option_that_changes_nothing(inputs):
+    words = [*make.COMMAND, *PIPE, "--rolling-duration", "0.5", "--ocio", "FIFO"]
+    done = subprocess.run(words, capture_output=True, timeout=120, check=True)
+    assert "has no effect without --rolling" in done.stderr.decode()
+    assert "keep their own colours, so --ocio has no effect" in done.stderr.decode()

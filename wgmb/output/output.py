@@ -28,7 +28,7 @@ from ..io.frame_numbers import (
     in_view,
     is_pattern,
 )
-from ..io.suffixes import STILLS, VIDEOS
+from ..io.suffixes import DEEP, STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of
 from ..sequence.layers import alpha, vectors
@@ -85,10 +85,9 @@ class Output:
         window: str = "grow",
         since: int | None = None,
     ):
-        _check_exr_options(pattern, layers, compression)
+        check_uses(pattern, bits=bits, layers=layers, compression=compression, window=window)
         if has_view(pattern) and not views:
             raise InputError(f"output {pattern}: %V stands for a view, but the frames have none")
-        check_choice("window", window, WINDOWS)
         self._layers, self._compression, self._display = layers, compression, display
         self._grows = window == "grow"
         self.pattern, self.bits, self.numbers = Path(pattern), bits, numbers
@@ -100,8 +99,6 @@ class Output:
         self._abandoned, self._is_whole, self._count, self._replaces = False, True, 0, overwrite
         self._under_way: Path | None = None
         check_suffix(pattern, self._ENDS)
-        if bits not in (8, 16) or (bits == 16 and suffix in (".jpg", ".jpeg")):
-            raise InputError(f"bits must be 8 or 16 (JPEG: 8), got {bits}")
         is_video = suffix in VIDEOS
         if is_video:
             with needed_by(f"output {pattern}", "video"):
@@ -341,11 +338,25 @@ class Output:
             atomic.remove(self._under_way)
 
 
-def _check_exr_options(pattern: str | Path, layers: str, compression: str) -> None:
+_OF_EXR = {"layers": "all", "compression": "zip", "window": "grow"}  # with their defaults
+
+
+def check_uses(
+    pattern: str | Path, *, bits: int, layers: str, compression: str, window: str
+) -> None:
+    """InputError for an option that is wrong, or has no use for this kind of output."""
     check_choice("layers", layers, ("all", "picture"))
+    check_choice("window", window, WINDOWS)
     exr.check_compression(compression)
-    if compression != "zip" and Path(pattern).suffix.lower() != ".exr":
-        raise InputError(f"compression {compression} needs an .exr output, got {pattern}")
+    if bits not in (8, 16):
+        raise InputError(f"bits must be 8 or 16, got {bits}")
+    suffix = Path(pattern).suffix.lower()
+    if bits == 16 and suffix not in DEEP:
+        raise InputError(f"`bits` 16 needs a .png or .tif output, got {pattern}")
+    given = {"layers": layers, "compression": compression, "window": window}
+    for name, value in given.items():
+        if value != _OF_EXR[name] and suffix != ".exr":
+            raise InputError(f"`{name}` {value} needs an .exr output, got {pattern}")
 
 
 # ---- the EXR file of a result: its source's file with the pictures replaced -------------------

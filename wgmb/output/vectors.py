@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError, check_choice
 from ..io import data_files, exr, record, stills
 from ..io.frame_numbers import has_view
+from ..io.suffixes import DEEP
 from ..sequence.data_windows import laid
 from ..sequence.frame_file import FrameFile
 from .output import Output
@@ -20,7 +21,6 @@ FORMS = ("nuke", "rsmb", "blender", "plain", "flo")
 """Whose vectors can be written; CONVENTIONS in vectors.py has the meaning of the numbers."""
 MAX_DISPLACE = 2048.0
 """The motion [px] that rsmb's 0 and 1 stand for, unless another is given."""
-_DEEP = (".png", ".tif", ".tiff")  # hold 16 bits
 _OF_THE_PICTURE = ("multiView", "view", "chromaticities", record.KEY)
 
 
@@ -57,7 +57,7 @@ class VectorOutput(Output):
     number of pixels that rsmb's form clipped, by frame. The others are as for Output.
     """
 
-    _ENDS = (".exr", *_DEEP, data_files.FLO)
+    _ENDS = (".exr", *DEEP, data_files.FLO)
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class VectorOutput(Output):
             pattern,
             settings=(settings or {}) | {"as": form} | unit,
             numbers=numbers,
-            bits=16 if str(pattern).lower().endswith(_DEEP) else 8,
+            bits=16 if str(pattern).lower().endswith(DEEP) else 8,
             inputs=inputs,
             overwrite=overwrite,
             resume=resume,
@@ -123,7 +123,7 @@ class VectorOutput(Output):
 
 def _check(pattern: str, form: str, max_displace: float | None, resume: bool) -> None:
     check_choice("`form`", form, FORMS)
-    ends = {"rsmb": (".exr", *_DEEP), "flo": (data_files.FLO,)}.get(form, (".exr",))
+    ends = {"rsmb": (".exr", *DEEP), "flo": (data_files.FLO,)}.get(form, (".exr",))
     if not pattern.lower().endswith(ends):
         raise InputError(f"output {pattern}: {form} vectors need {' or '.join(ends)}")
     if resume and form == "flo":

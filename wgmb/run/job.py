@@ -35,9 +35,10 @@ from ..sequence.frame_file import about
 from ..sequence.input_color import space_of
 from ..sequence.layers.masks import is_file, with_amount
 from ..settings import OutputSettings
+from ..settings.groups import changed
 from ..settings.recipes import by_place
 from ..settings.record import record
-from ..settings.video import VideoSettings
+from ..settings.video import OF_FRAMES, VideoSettings
 from ..shots.cut_list import CutList
 from ..threads import Stop
 from .conversion import RateConversion, RateConversionStages
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
     from .picture_stages import PictureRoad
 
 _OWN = 0.5  # frame intervals around a frame that it stands for
+_OF_VECTORS = "vector_scale", "vector_offset", "vector_flip", "vector_mask"  # of InputSettings
+_OF_DEPTH = "depth_kind", "far"
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,11 +229,13 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     if request.shutter.seconds is None:  # says what is wrong with it
         request.shutter.make()
     check_suffix(request.output.output)
+    check_fits(request)
     clip, shown = request.opened()
     findings = clip.inspect()
     request = replace(request, shutter=request.shutter.resolved(fps=_rate(request, clip)))
     clip.builder.check_layers()
     remarks = [
+        *_without_effect(request, findings),
         request.input.remark,
         request.shutter.remark,
         *map(_of_scale, request.blur.scale),
@@ -242,7 +247,8 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     conversion = request.conversion
     if conversion:
         remarks.append(_of_conversion(conversion, clip, request.output))
-        request = replace(request, output=replace(request.output, layers="picture"))
+        if request.output.is_exr:
+            request = replace(request, output=replace(request.output, layers="picture"))
     video, how = _motion(findings, request, adapter)
     is_by_place = bool(how) and request.video.flow == "auto" and video.flow == "dis"
     has_edges = is_by_place and request.blur.method is None
@@ -275,6 +281,30 @@ def settle(request: BlurRequest, adapter: str | None = None) -> Job:
     told = tuple(filter(None, remarks))
     opened = clip, shown
     return Job(request, settings, clip.numbers, findings, how, clip_opened=opened, remarks=told)
+
+
+def check_fits(request: BlurRequest) -> None:
+    """InputError for settings that only input videos have, or outputs of another kind."""
+    for name in changed(request.video):
+        if name not in OF_FRAMES:
+            raise InputError(f"`{name}` is for input videos, {request.pattern} names frames")
+    request.output.check()
+
+
+def _without_effect(request: BlurRequest, findings: SequenceFindings) -> list[str]:
+    """Lines on options that change nothing, as the frames hold other layers."""
+    if not findings.has:  # none can be read
+        return []
+    has_motion, has_depth = "motion" in findings.has, "depth" in findings.has
+    input = [] if has_motion else [n for n in changed(request.input) if n in _OF_VECTORS]
+    depth = [] if has_depth else [n for n in changed(request.input) if n in _OF_DEPTH]
+    video = [n for n in changed(request.video) if n.startswith("flow")] if has_motion else []
+    found = {"no vectors": input, "no depth": depth, "motion of their own": video}
+    return [
+        f"the frames have {layers}, so `{name}` has no effect"
+        for layers, names in found.items()
+        for name in names
+    ]
 
 
 def _rate(request: BlurRequest, clip: Clip) -> Fraction | None:

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..io import atomic
 from ..io.pipes import STDIN, STDOUT, PipeWriter, is_pipe
 from ..settings import OutputSettings
+from ..settings.groups import changed
 from ..settings.output import rate_of
 from ..settings.video import VideoSettings
 from ..video.clock import tick
@@ -35,7 +36,8 @@ from .video import ExposedFrames, VideoRequest, VideoRun
 from .video_sink import Form, PictureWriter, VideoSink, coded_form
 
 _BUFFER = 1 << 20  # bytes
-_OF_FILES = "begin", "end", "speed"  # of VideoSettings
+_OF_RANGES = "begin", "end", "speed"  # of VideoSettings
+_OF_FILES = "streams", "pitch"  # too; both of sound and other streams
 _Y4M = b"YUV4MPEG2"
 
 
@@ -109,6 +111,8 @@ def blur_pipe(
             reader = reader_of(stream, _plain(source), request, hints)
         run = request.open(device)
         tell(f"motion: {run.how}")
+        if request.shutter.remark:
+            tell(request.shutter.remark)
         found = (
             _piped(reader, run, output, hints.fps_in) if reader else _of_file(source, run, output)
         )
@@ -138,14 +142,18 @@ def blur_pipe(
 
 
 def _check(source: str, output: OutputSettings, request: VideoRequest) -> None:
-    plain = VideoSettings()
     if output.resume:
         raise InputError("`resume` needs files; nothing of a pipe is kept")
+    output.check()
+    used = changed(request.video)
+    for name in _OF_FILES:
+        if name in used:
+            raise InputError(f"`{name}` is for files; a pipe carries pictures alone")
     if is_pipe(source):
-        used = [name for name in _OF_FILES if getattr(request.video, name) != getattr(plain, name)]
-        if used or request.input.frames:
+        ranges = [name for name in used if name in _OF_RANGES]
+        if ranges or request.input.frames:
             raise InputError(
-                f"`{[*used, 'frames'][0]}` is for files; a pipe is read from its beginning"
+                f"`{[*ranges, 'frames'][0]}` is for files; a pipe is read from its beginning"
             )
         if request.blur.holdout not in ((), (NONE,)):
             raise InputError("`holdout` of a video is for files; a pipe is read once")

@@ -116,6 +116,8 @@ class SceneRequest:
         output = self.output
         if self.blur.holdout or self.blur.scale:
             raise InputError("`holdout` and `scale` need input files; use them with wgmb blur")
+        if self.options.time is not None and self.options.frames is not None:
+            raise InputError("`time` is for a single image; `frames` have their own times")
         if self.passes and not output.is_exr:
             raise InputError(f"`passes` needs an .exr output, got {output.output}")
         if self.passes and output.layers == "picture":

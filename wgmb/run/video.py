@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Unpack, get_args, get_origin, get_type_hints
@@ -19,7 +19,7 @@ from ..methods import check_method
 from ..methods.keywords import MethodKeywords
 from ..pipeline.blur import Blur
 from ..settings import BlurSettings, InputSettings, OutputSettings
-from ..settings.groups import SettingsGroups, chosen, groups_of
+from ..settings.groups import SettingsGroups, changed, chosen, groups_of
 from ..settings.record import record
 from ..settings.video import VideoSettings
 from ..shots.cut_list import CutList
@@ -290,9 +290,9 @@ class ExposedFrames:
 
 def check_fits(input: InputSettings, blur: BlurSettings) -> None:
     """InputError for settings that only rendered frames have."""
-    for one in fields(InputSettings):
-        if one.name not in _TAKEN and getattr(input, one.name) != one.default:
-            raise InputError(f"`{one.name}` is for rendered frames, a video has no layers")
+    for name in changed(input):
+        if name not in _TAKEN:
+            raise InputError(f"`{name}` is for rendered frames, a video has no layers")
     if blur.scale:
         raise InputError("`scale` is for rendered frames, a video has no layers")
 

@@ -11,11 +11,13 @@ from typing import Any, Protocol
 
 import wgpu
 
+from ..errors import InputError
 from ..io import atomic, record
 from ..io.pipes import is_pipe
 from ..output.finished_videos import is_finished
 from ..output.names import beyond, check_suffix, refuse_inputs
 from ..settings import OutputSettings
+from ..settings.groups import changed
 from ..settings.video import VideoSettings
 from ..video.clock import Clock
 from ..video.output_times import OutputFrame, OutputFrames
@@ -31,6 +33,7 @@ from .file_sink import FileSink
 from .report import Progress
 from .video_sink import Form, LightForm, VideoSink, coded_form, frame_record
 
+_OF_VIDEOS = "codec", "quality", "encoder", "streams", "pitch"  # of VideoSettings
 FIRST = 1  # number of the first frame, where they are image files
 
 
@@ -82,11 +85,16 @@ def check_output(output: OutputSettings, video: VideoSettings, source: str | Pat
     This covers checks that need no look at the input: the kind of file, its codec, a rate that is
     set, and an output that is the input.
     """
+    output.check()
     if is_pipe(output.output):
         return
     path = Path(output.output)
     check_suffix(path)
-    if path.suffix.lower() in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES:
+        for name in changed(video):
+            if name in _OF_VIDEOS:
+                raise InputError(f"`{name}` needs a video as output, got {path}")
+    else:
         chosen(path, video.codec, video.quality, video.encoder)
         if path.suffix.lower() == ".gif" and output.fps not in (None, "source"):
             check_rate(path, output.rate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 
 from ..color.ocio import installed
@@ -60,6 +61,22 @@ class ColorSettings(DisplaySettings):
 
     from_: str | None = None
     "Colour space of the input, such as acescg; default: by its attributes, else linear Rec.709."
+
+    def told_of_videos(self) -> str:
+        """A line on options that have no effect on videos; "" without any.
+
+        InputError for a time, where a part of the video was meant.
+        """
+        if self.from_ and re.fullmatch(r"[\d:.]+", self.from_):
+            raise InputError(
+                f"`from_` is a colour space, got {self.from_}; a part of a video is `begin` "
+                "and `end`"
+            )
+        used = [f"`{name}`" for name, value in vars(self).items() if value is not None]
+        if not used:
+            return ""
+        have = "has" if len(used) == 1 else "have"
+        return f"videos keep their own colours, so {' and '.join(used)} {have} no effect"
 
     def space(self, display: Display | None) -> ColorSpace | None:
         """The colour space of the input, where it is given; `display`: from `open`."""

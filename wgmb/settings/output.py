@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from ..color.spaces import Display
 from ..errors import InputError
-from ..output.output import Output
+from ..output.output import Output, check_uses
 from .record import plain
 
 _NO_LOOK = "output", "fps", "overwrite", "resume"
@@ -40,6 +40,10 @@ class OutputSettings:
     def is_exr(self) -> bool:
         """True if the output keeps linear light, instead of showing it to people."""
         return self.output.lower().endswith(".exr")
+
+    def check(self) -> None:
+        """InputError for an option that has no use for this kind of output, as from `make`."""
+        check_uses(self.output, **self.looks)
 
     @property
     def looks(self) -> dict[str, Any]:

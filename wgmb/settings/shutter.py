@@ -85,7 +85,17 @@ class ShutterSettings:
 
     @property
     def remark(self) -> str:
-        """A line about an angle that is too small to be one, or ''."""
+        """A line about an angle that is too small to be one, or an option without effect; or ''."""
+        return "; ".join(filter(None, (self._few_degrees, self._without_rolling)))
+
+    @property
+    def _without_rolling(self) -> str:
+        if self.rolling is not None or self.rolling_duration == 1.0:
+            return ""
+        return "`rolling_duration` has no effect without `rolling`"
+
+    @property
+    def _few_degrees(self) -> str:
         angle = self.shutter
         if isinstance(angle, str) or angle is None or not 0 < angle < _FEW_DEGREES:
             return ""

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from ..video.read.reader import VideoReader
 
 
+OF_FRAMES = frozenset({"flow", "flow_quality", "highlights"})
+"""Options of videos that rendered frames have, too."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FlowSettings:
     """Source of the motion of pictures."""

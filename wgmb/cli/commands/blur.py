@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from ...io.pipes import is_pipe
 from ...run.job import settle
 from ...run.request import BlurRequest
 from ...sequence.frame_file import is_video
-from ...settings.color import ColorSettings, option_name
+from ...settings.color import ColorSettings
 from ...settings.groups import SettingsGroups
 from .. import run_log
 from ..console import Console
@@ -253,6 +252,7 @@ def _take_pipe(call: BlurCall) -> int:
         from ...run.pipe import StreamHints
         from ...run.video import VideoRequest
         from .blur_pipe import blur_pipe
+    call.console.say(call.groups.color.told_of_videos())
     request = VideoRequest.of(call.groups)
     hints = StreamHints(call.fps_in, call.color_in)
     return blur_pipe(pattern, output, request, call.console, hints, call.adapter)
@@ -264,7 +264,7 @@ def _take_videos(call: BlurCall) -> int:
     with needed_by(pattern, "video"):
         from ...run.video import VideoRequest
         from .blur_video import blur_videos
-    _tell_unused(call.groups.color, call.console)
+    call.console.say(call.groups.color.told_of_videos())
     request = VideoRequest.of(call.groups)
     return blur_videos(call.patterns, output, request, call.console, call.adapter, call.trial)
 
@@ -329,16 +329,3 @@ ROADS = (
     Road(lambda call: True, _take_frames, {"--color-in": _FOR_PIPES, "--try": _TRIED}),
 )
 """The roads, of which the first that a call means is taken."""
-
-
-def _tell_unused(color: ColorSettings, console: Console) -> None:
-    """Say which colour options have no part in the blur of videos; InputError for a time."""
-    plain = ColorSettings()
-    if color.from_ and re.fullmatch(r"[\d:.]+", color.from_):
-        raise InputError(
-            f"--from is a colour space, got {color.from_}; a part of a video is --begin and --end"
-        )
-    used = [f.name for f in fields(plain) if getattr(color, f.name) != getattr(plain, f.name)]
-    if used:
-        options = ", ".join(map(option_name, used))
-        console.say(f"videos keep their own colours: {options} not used")

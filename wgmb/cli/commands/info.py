@@ -23,6 +23,7 @@ from ...sequence.frame_file import FrameFile, is_video
 from ...sequence.input_color import space_of
 from ...sequence.layers import names
 from ...settings.color import ColorSettings
+from ...settings.groups import changed
 from ..console import Console
 from ..exit_codes import DONE
 from ..names import frames_at
@@ -62,15 +63,19 @@ def info(
     scan
         Decode a video to its end, and list its cuts, flashes and repeated pictures.
     """
-    shown = color.open()
     if is_video(pattern):
         with needed_by(pattern, "video"):
             from .info_video import tell_about
         if output is not None:
             raise InputError("`output` draws the motion of rendered frames, a video holds none")
+        for name in changed(input):
+            if name != "max_mb":
+                raise InputError(f"`{name}` is for rendered frames; a video is described whole")
+        Console().say(color.told_of_videos())
         return tell_about(pattern, input.max_mb, scan)
     if scan:
         raise InputError("`scan` is for videos")
+    shown = color.open()
     found = frames_at(pattern, input)
     clip = found.input.open(found.pattern, space=color.space(shown))
     Console().say(color.remark)

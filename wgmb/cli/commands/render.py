@@ -81,7 +81,7 @@ def render(
     )
     run = request.open(adapter)
     console = Console(quiet, verbose)
-    console.say("" if output.is_exr else color.remark)
+    console.say(shutter.remark, "" if output.is_exr else color.remark)
     console.detail(f"adapter: {run.render.blur.device.adapter.summary}")
     console.detail(f"settings: {run.output.settings}")
     started = time.perf_counter()

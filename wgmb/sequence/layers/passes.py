@@ -72,5 +72,8 @@ class Passes:
             raise InputError(
                 "motion from `camera` needs distances: `depth_kind` planar, inverse or clip"
             )
+        for name in ("object_motion", "object_layer"):
+            if getattr(self, name) and self.camera is None:
+                raise InputError(f"`{name}` needs `camera`, a file with the cameras of the frames")
         if not self.far > 0:
             raise InputError(f"far must be over 0, got {self.far}")

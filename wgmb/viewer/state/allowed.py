@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 from ...errors import InputError
 from ...settings.color import option_name
+from ...settings.video import OF_FRAMES
 from .groups import GROUP_OF, MASKS, changed
 from .shown_moment import ShownMoment
 
@@ -15,7 +16,6 @@ INPUTS = frozenset({*(name for name, group in GROUP_OF.items() if group == "inpu
 """Options that say what files hold."""
 OF_VIDEOS = frozenset({"holdout", "max_mb", "cuts"})
 """Those of them that videos have."""
-_BLURRED = frozenset({"flow", "flow_quality", "highlights"})  # that `wgmb blur` has for frames, too
 
 
 def check_options(state: ShownMoment, named: Collection[str]) -> None:
@@ -23,7 +23,7 @@ def check_options(state: ShownMoment, named: Collection[str]) -> None:
     for name in named:
         option = option_name(name)
         if name in VIDEO and not state.is_video:
-            if name in _BLURRED and not state.is_scene:
+            if name in OF_FRAMES and not state.is_scene:
                 raise InputError(
                     f"{option} of frames is for `wgmb blur`: the viewer shows it of videos only"
                 )
