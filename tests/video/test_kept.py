@@ -76,6 +76,23 @@ def test_a_crop_of_matroska_is_cut_off(tmp_path):
 
 
 @pytest.mark.fast
+@pytest.mark.parametrize("left", [2, 4, 34])
+def test_a_crop_within_h264_is_exact(tmp_path, left):
+    """FFmpeg's decoder crops the left in steps of 32 bytes, unless it is told otherwise."""
+    whole = clips.write(tmp_path / "a.h264", kind="h264")
+    filtered = f"h264_metadata=crop_left={left}:crop_top=2"
+    with av.open(str(whole)) as file, open(tmp_path / "b.h264", "wb") as to:
+        by = av.BitStreamFilterContext(filtered, file.streams.video[0])
+        for packet in file.demux(video=0):
+            for one in by.filter(packet if packet.size else None):
+                to.write(bytes(one))
+    reader = VideoReader(tmp_path / "b.h264")
+    assert reader.size == (64 - left, 46)
+    for (_, got), (_, want) in zip(reader, VideoReader(whole), strict=True):
+        np.testing.assert_array_equal(got.planes[0], want.planes[0][2:, left:])
+        np.testing.assert_array_equal(got.planes[1], want.planes[1][1:, left // 2 :])
+
+
 def test_a_crop_of_all_is_none():
     assert whole_samples((30, 34, 0, 0), (64, 48), (2, 2)) == (0, 0, 0, 0)
     planes = (np.zeros((5, 7)), np.zeros((3, 4)), np.zeros((3, 4)))

@@ -5,6 +5,7 @@ from fractions import Fraction
 import av
 import numpy as np
 import pytest
+from av.stream import Disposition
 
 import make_clips as clips
 from wgmb.video.clock import Clock, tick
@@ -220,6 +221,28 @@ def test_everything_comes_along(tmp_path):
             for key in ("language", "title", "filename", "mimetype"):
                 assert one.metadata.get(key) == other.metadata.get(key)
         assert b.streams.attachments[0].data == b"abc" * 99
+
+
+@pytest.mark.parametrize("to", ["b.mkv", "b.mp4"])
+def test_a_cover_stays_a_cover(tmp_path, to):
+    """As a stream of Matroska it would be another video of one picture."""
+
+    def add(container):
+        cover = container.add_stream("mjpeg")
+        cover.width, cover.height, cover.pix_fmt = 32, 32, "yuvj420p"
+        cover.disposition = Disposition.attached_pic
+
+    def after(container):
+        container.mux(container.streams.video[1].encode(clips.grey((32, 32), "yuvj420p")))
+
+    source, path = clips.write(tmp_path / "a.mp4", before=add, also=after), tmp_path / to
+    assert copied(source, path) == []
+    found = []
+    for one in (source, path):
+        with av.open(str(one)) as container:
+            assert container.streams.video[1].disposition & Disposition.attached_pic
+            found.append([bytes(p) for p in container.demux(video=1) if p.size])
+    assert found[0] == found[1] and len(found[0]) == 1
 
 
 def test_what_a_container_cannot_hold_is_left_out_and_said(tmp_path):

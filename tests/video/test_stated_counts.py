@@ -22,6 +22,7 @@ from soaking.stated import videos
 from wgmb import InputError, allocator, blur_video, threads
 from wgmb.io import watch
 from wgmb.video.read import container
+from wgmb.video.read.boxes import check_counts
 from wgmb.video.read.reader import VideoReader
 
 MANY = 80_000_000
@@ -105,6 +106,16 @@ def test_an_index_that_the_file_cannot_hold_is_refused_unread(tmp_path, sound, k
     with pytest.raises(InputError, match=r"hostile\.mp4: .*(states|index)") as refused:
         VideoReader(path)
     assert str(refused.value).count("hostile.mp4") == 1
+
+
+def test_names_of_texts_are_no_boxes(tmp_path):
+    """A name may look like the head of a long box that ends before its own head does."""
+    names = (1).to_bytes(4, "big") + b"hdlr" + bytes(4)
+    path = tmp_path / "a.mp4"
+    path.write_bytes(
+        box(b"ftyp", b"isom" + bytes(4)) + box(b"moov", box(b"meta", names)) + b"1" * 16
+    )
+    check_counts(path, 100)
 
 
 def test_indices_that_the_file_holds_are_read(tmp_path, sound):

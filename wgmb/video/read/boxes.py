@@ -49,7 +49,7 @@ def boxes(file: BinaryIO, begin: int, end: int) -> Iterator[Box]:
             length, inside = int.from_bytes(head[8:], "big"), begin + 16
         if length == 0:
             length = end - begin
-        if begin + length < inside:
+        if min(begin + length, end) < inside:
             return
         yield Box(kind, inside, min(begin + length, end), begin + length <= end)
         begin += length

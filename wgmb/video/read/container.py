@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 import av
+from av.codec.context import Flags
 from av.container import InputContainer
 from av.error import FFmpegError
 from av.stream import Disposition
@@ -60,6 +61,9 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
             metadata_errors="replace",
         )
         bound_pictures(container, bound)
+        for stream in container.streams.video:
+            if stream.codec_context is not None:  # else it crops the left in steps of 32 bytes
+                stream.codec_context.flags |= Flags.unaligned
         return container
 
     bound = largest_picture(stored, max_mb)

@@ -208,6 +208,11 @@ class VideoReader:
             self.notes.append(
                 f"{many} {have} the time of another, the first at {at:.2f} s: left out"
             )
+        if slowed := self._packets.slowed:
+            self.notes.append(
+                f"{counted(slowed, 'picture')} with a delay under 0.02 s: shown for 0.1 s, as "
+                "browsers show it"
+            )
         if self._packets.is_assumed:
             self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
                               "second assumed")  # fmt: skip

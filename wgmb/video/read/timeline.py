@@ -40,6 +40,7 @@ _UNEVEN = 0.02  # of a step: more is a variable rate
 _JITTER = 0.25  # of a step: less is a rate all the same
 _SELDOM = 0.05  # of the steps: if more are uneven, the rate varies
 _ANIMATIONS = ("gif", "apng")
+_SHORTEST_DELAY, _DELAY = 2, 10  # of a GIF [1/100 s]: one that is kept, and the one instead
 _FINEST = 1_001_000  # denominator of a rate
 
 
@@ -97,6 +98,8 @@ class Timeline:
     """Ticks of pictures that have the time of another one, and so are never shown."""
     begins: dict[int, Fraction] = field(default_factory=dict)
     """The time at which each stream begins, by its number [s]."""
+    slowed: int = 0
+    """Pictures of a GIF whose delay players do not keep, see `_as_shown`."""
     goes_back: tuple[int, Fraction, Fraction] | None = None
     """The first packet whose clock begins anew: its number, the time before it, its own [s]."""
 
@@ -244,7 +247,9 @@ def scanned(container: InputContainer, stream: VideoStream, path: Path) -> Timel
         begins={i: n * bases[i] for i, n in begins.items()},
         goes_back=None if is_assumed else _going_back(found.decoded, base),
     )
-    if in_order:
+    if container.format.name == "gif":
+        timeline = _as_shown(timeline)
+    if timeline.in_order:
         return timeline
     counted = _counted(timeline, found, bool(stream.codec_context.has_b_frames))
     return replace(timeline, counted=counted, repeated=_repeated(found.presented))
@@ -307,6 +312,21 @@ def _lasting(stream: VideoStream, packets: PictureTimes, timeline: Timeline) -> 
         lasts = min(lasts, until - last) if until > last else lasts
     states_each = stream.codec_context.name in _ANIMATIONS
     return lasts * base if states_each or lasts * base > 1 / KNOWN_RATES[0] else Fraction(0)
+
+
+def _as_shown(timeline: Timeline) -> Timeline:
+    """The times of a GIF as browsers show it: a delay under two hundredths of a second is ten."""
+    base, ticks = timeline.times.base, timeline.times.ticks
+    delays = np.append(np.diff(ticks), round(timeline.lasts / base) or _DELAY)
+    short = delays < _SHORTEST_DELAY
+    if not short.any():
+        return timeline
+    delays[short] = _DELAY
+    times = ticks[0] + np.append(0, np.cumsum(delays[:-1]))
+    return replace(
+        timeline, times=Times(times, base), lasts=int(delays[-1]) * base, in_order=True,
+        stated=None, slowed=int(np.count_nonzero(short)),
+    )  # fmt: skip
 
 
 def known_rate(rate: Fraction | None) -> Fraction | None:

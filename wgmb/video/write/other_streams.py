@@ -132,7 +132,7 @@ class OtherStreams:
 
     def _why_not(self, stream: Stream) -> str:
         """The reason why a stream cannot be copied, or ''."""
-        if stream.type == "video" and not stream.disposition & Disposition.attached_pic:
+        if stream.type == "video" and not _is_cover(stream):
             return "only one stream of pictures is written"
         if stream.type in ("audio", "subtitle") and stream.codec_context is None:
             return "its codec is not known"
@@ -143,6 +143,9 @@ class OtherStreams:
         again = isinstance(stream, AudioStream) and self._clock.speed != 1
         if why := _refusal(stream, to.format.name, again):
             return why
+        if _is_cover(stream) and to.format.name == "matroska":
+            self._attach_cover(stream, to)
+            return ""
         if again:
             source = cast(AudioStream, stream)
             into = encoder(source, to)
@@ -154,6 +157,18 @@ class OtherStreams:
         if stream.type != "attachment":
             self._ways[stream.index] = _Copied(stream, made, self._clock)
         return ""
+
+    def _attach_cover(self, stream: Stream, to: OutputContainer) -> None:
+        """Add a cover as a file, as Matroska keeps it: a stream would be another video there."""
+        assert stream.codec_context is not None
+        with opened(self._path, is_known=True) as container:
+            packets = container.demux(container.streams[stream.index])
+            data = next((bytes(packet) for packet in packets if packet.size), b"")
+        codec = stream.codec_context.name
+        kind, ending = ("jpeg", "jpg") if codec == "mjpeg" else (codec, codec)
+        name = stream.metadata.get("filename", f"cover.{ending}")
+        to.add_attachment(name, stream.metadata.get("mimetype", f"image/{kind}"), data)
+        stream.discard = Discard.all
 
     def until(self, time: Fraction) -> Iterator[Packet[Any]]:
         """The packets up to an output time, as far as they have not been returned yet."""
@@ -205,7 +220,7 @@ class _Copied:
         if packet is None:
             return
         packet.stream = self._into
-        if self._source.disposition & Disposition.attached_pic:
+        if _is_cover(self._source):
             packet.pts = packet.dts = 0
             yield packet
             return
@@ -257,6 +272,10 @@ class _Copied:
         if packet.duration:
             packet.duration = round((until - begins) / base)
         return True
+
+
+def _is_cover(stream: Stream) -> bool:
+    return bool(stream.disposition & Disposition.attached_pic)
 
 
 def _is_cut(packet: Packet[Any]) -> bool:
