@@ -8,6 +8,7 @@ import pytest
 import wgmb
 from make_frames import add_attributes, write_exr
 from wgmb.flow.dis import Dis
+from wgmb.pipeline import panorama
 from wgmb.sequence import panorama_signs
 from wgmb.sequence.layers.passes import Passes
 
@@ -157,3 +158,12 @@ def test_a_part_of_a_panorama_is_refused_where_it_is_asked_for(tmp_path):
     clip = wgmb.Clip(tmp_path / "s.exr", passes=Passes(wrap="on"))
     with pytest.raises(wgmb.InputError, match="whole panorama"):
         clip.frame(clip.source(clip.numbers[0]))
+
+
+@pytest.mark.fast
+def test_infinite_vectors_make_no_panorama():
+    motion = np.full((8, 16, 4), 3, np.float32)
+    motion[0, :2], motion[1] = np.inf, np.nan
+    assert not panorama.crosses(motion)
+    motion[2, 3, 2] = -9
+    assert panorama.crosses(motion)

@@ -537,3 +537,19 @@ def test_the_kind_of_depth_is_told_instead(tmp_path):
     assert tuple(order_of(clip)) == pytest.approx((1 / 3, 1 / 9))
     with pytest.raises(InputError, match="needs distances"):
         Passes(depth_kind="white-near", camera=tmp_path / "c.json")
+
+
+def test_a_body_that_leaves_a_render_region_is_not_covered_by_nothing(tmp_path):
+    """Blender writes no picture, 1e11 as depth and 10000 as vectors outside of the region."""
+    for n in NUMBERS:
+        inside = to_next(n).any(axis=2)
+        planes = make.frame(n, "blender")
+        planes["ViewLayer.Depth.Z"] = np.where(inside, 3, 9).astype("f4")
+        for name, plane in planes.items():
+            nothing = {"Depth": 1e11, "Vector": 1e4}.get(name.split(".")[1], 0)
+            plane[:, 44:] = nothing
+        make.write_exr(tmp_path / f"s.{n:04d}.exr", planes)
+    clip = Clip(tmp_path / "s.####.exr")
+    depth = clip.frame(clip.source(5)).depth
+    assert (depth[:, :44].min(), depth[:, :44].max()) == (3, 9)
+    assert not clip.notes

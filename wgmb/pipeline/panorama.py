@@ -21,11 +21,11 @@ _MOTION = "motion", "to_next", "to_prev"
 
 
 def crosses(motion: np.ndarray | None) -> bool:
-    """True if vectors, (height, width, 2 or 4) [px], are longer than half the width."""
+    """True if vectors, (height, width, 2 or 4) [px], are finite and longer than half the width."""
     if motion is None:
         return False
-    with np.errstate(invalid="ignore"):
-        return bool((np.abs(motion[..., ::2]) > motion.shape[1] / 2).any())
+    across = np.abs(motion[..., ::2])
+    return bool(((across > motion.shape[1] / 2) & np.isfinite(across)).any())
 
 
 def shortest(frame: Frame) -> Frame:

@@ -1,7 +1,7 @@
 """Order of depth, by occlusion: near surfaces hide far ones where they meet.
 
 Two pixels that move to one place of a neighbouring frame differ in depth; that place shows the
-nearer one.
+nearer one. Where it shows nothing, as outside of a render region, it tells nothing.
 """
 
 from __future__ import annotations
@@ -66,6 +66,8 @@ def votes(color: np.ndarray, motion: np.ndarray, depth: np.ndarray, near: np.nda
         is_inside = ((to >= 0) & (to <= (width - 1, height - 1))).all(axis=1)
     at = np.flatnonzero(is_inside & ~np.isnan(depth))
     places = np.rint(to[at]).astype(np.int64) @ (1, width)
+    is_drawn = near.reshape(height * width, -1).any(axis=1)[places]
+    at, places = at[is_drawn], places[is_drawn]
     order = np.argsort(places, kind="stable")
     at, places = at[order], places[order]
     pairs = np.stack([at[:-1], at[1:]])[:, places[:-1] == places[1:]]
