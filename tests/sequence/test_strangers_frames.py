@@ -400,9 +400,7 @@ ONE_WAY = (
 
 
 @pytest.mark.parametrize("up", [-1, pytest.param(1, marks=pytest.mark.full)])
-@pytest.mark.parametrize(
-    "names", [*ONE_WAY[:2], *(pytest.param(n, marks=pytest.mark.full) for n in ONE_WAY[2:])]
-)
+@pytest.mark.parametrize("names", [ONE_WAY[0], *in_full(*ONE_WAY[1:])])
 def test_names_that_programs_give_to_vectors_are_known(tmp_path, names, up):
     turned = np.array([1, up], "f4")
     is_right(Clip(of_layers(tmp_path, lambda n: {names: to_next(n) * turned})), 0)
@@ -412,8 +410,8 @@ def test_names_that_programs_give_to_vectors_are_known(tmp_path, names, up):
 @pytest.mark.parametrize(
     "names",
     [("motionFore.x,motionFore.y", "motionBack.x,motionBack.y"),
-     pytest.param(("VectorX,VectorY", "BackVectorX,BackVectorY"), marks=pytest.mark.full),
-     ("forward.u,forward.v", "backward.u,backward.v")],
+     *in_full(("VectorX,VectorY", "BackVectorX,BackVectorY"),
+              ("forward.u,forward.v", "backward.u,backward.v"))],
 )  # fmt: skip
 def test_vectors_to_the_previous_frame_may_lead_from_it(tmp_path, names, sign):
     ahead, back = names
@@ -505,7 +503,7 @@ def order_of(clip: Clip) -> np.ndarray:
     return np.array([np.nanmedian(depth[inside]), np.nanmedian(depth[~inside])])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*list(KINDS)[:2], *in_full(*list(KINDS)[2:])])
 def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind):
     pattern = of_depth(tmp_path, KINDS[kind])
     clip = Clip(pattern)
@@ -522,7 +520,7 @@ def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind)
     assert ("larger depth is nearer" in out) == (kind != "planar")
 
 
-@pytest.mark.parametrize("empty", [np.inf, 0.0, *in_full(1e10, np.nan)])
+@pytest.mark.parametrize("empty", [np.inf, *in_full(0.0, 1e10, np.nan)])
 def test_empty_depth_does_not_turn_its_order(tmp_path, empty):
     clip = Clip(of_depth(tmp_path, KINDS["planar"], empty))
     assert tuple(order_of(clip)) == (3, 9)

@@ -66,7 +66,7 @@ def votes(color: np.ndarray, motion: np.ndarray, depth: np.ndarray, near: np.nda
         is_inside = ((to >= 0) & (to <= (width - 1, height - 1))).all(axis=1)
     at = np.flatnonzero(is_inside & ~np.isnan(depth))
     places = np.rint(to[at]).astype(np.int64) @ (1, width)
-    is_drawn = near.reshape(height * width, -1).any(axis=1)[places]
+    is_drawn = np.any(near.reshape(height * width, -1)[places], axis=1)
     at, places = at[is_drawn], places[is_drawn]
     order = np.argsort(places, kind="stable")
     at, places = at[order], places[order]
