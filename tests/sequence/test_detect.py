@@ -7,7 +7,7 @@ import pytest
 
 import make_frames as make
 from make_vectors import BOTH, ONE, moving, side_by_side, told
-from wgmb import Clip
+from wgmb import Clip, Passes, Vectors
 from wgmb.sequence.layers import vector_test, vectors
 
 pytestmark = pytest.mark.fast
@@ -98,7 +98,10 @@ def test_on_a_single_frame_it_says_that_it_cannot_tell():
     assert "no neighbouring frame" in found.text
 
 
-@pytest.mark.parametrize("seed", range(5))
+SEEDS = [0, *(pytest.param(n, marks=pytest.mark.full) for n in range(1, 5))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_vectors_of_noise_are_not_believed(seed):
     rng = np.random.default_rng(seed)
     motion = moving(seed)
@@ -109,7 +112,7 @@ def test_vectors_of_noise_are_not_believed(seed):
     assert "check them" in found.text
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_vectors_of_a_real_motion_are_not_believed(seed):
     pictures = [make.picture(n) for n in (4, 5, 6)]
     found = found_of(
@@ -213,6 +216,56 @@ def test_others_are_tested_on_the_first_the_middle_and_the_last(tmp_path):
     assert {1, 5, 9} <= set(clip.sizes)
     got = clip.frame(clip.source(4)).motion[..., 2:]
     np.testing.assert_allclose(got, make.motion(4)[1], atol=0.02)
+
+
+# ---- vectors below a pixel ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("light", [1.0, 0.02])
+def test_the_unit_is_found_in_the_dark_and_where_little_changes(light):
+    size = np.array([make.WIDTH, make.HEIGHT], "f4")
+    pictures = [light * make.picture(n) for n in (4, 5, 6)]
+    motion = side_by_side([v / size for v in make.motion(5)])
+    found = found_of(pictures[1], motion, pictures[0], pictures[2], told("plain"))
+    assert found.sure
+    assert found.vectors == told("plain", scale=(make.WIDTH, make.HEIGHT))
+
+
+def test_noise_in_the_dark_is_no_motion():
+    rng = np.random.default_rng(0)
+    still = 0.05 * make.picture(5)
+    pictures = [still + rng.normal(0, 0.005, still.shape).astype("f4") for _ in range(3)]
+    slow = np.full((make.HEIGHT, make.WIDTH, 4), 1e-3, "f4")
+    found = found_of(pictures[1], slow, pictures[0], pictures[2], told("plain"))
+    assert not found.notable
+    assert "nothing moves" in found.text
+
+
+@pytest.mark.parametrize(
+    ("convention", "speed", "text"),
+    [("rsmb", 0.1, "`vector_scale` is twice the longest motion"),
+     ("vray", 0.1, "`vector_scale` is twice the longest motion"),
+     ("plain", 0.1, f"`vector_scale={make.WIDTH},{make.HEIGHT}` makes them pixels"),
+     ("plain", 3.0, ""), ("vray", 3.0, ""), ("blender", 0.1, ""), ("plain", 0.0, "")],
+)  # fmt: skip
+def test_a_unit_that_a_single_frame_does_not_tell_is_asked_for(convention, speed, text):
+    motion = np.full((make.HEIGHT, make.WIDTH, 4), speed, "f4")
+    found = found_of(make.picture(5), motion, None, None, Vectors(convention))
+    assert text in found.text
+    assert found.notable == bool(text)
+    again = found_of(make.picture(5), motion, None, None, Vectors(convention, scale=64.0))
+    assert not again.notable
+
+
+@pytest.mark.parametrize("layer", ["motion", "to_next"])
+@pytest.mark.parametrize("chosen", [{}, {"convention": "plain"}, {"flip": "y"}])
+def test_a_direction_that_a_single_frame_does_not_tell_is_named(tmp_path, layer, chosen):
+    ahead = make.motion(5)[1]
+    planes = {f"{layer}.x": ahead[..., 0], f"{layer}.y": ahead[..., 1]}
+    path = make.write_exr(tmp_path / "s.exr", make.colors(make.picture(5)) | planes)
+    clip = Clip(path, passes=Passes(vectors=Vectors(**chosen)))
+    assert clip.is_finding_notable == ("`vector_flip=y`" in clip.finding)
+    assert clip.is_finding_notable == (layer == "motion" and not chosen)
 
 
 # ---- vectors that are 0 everywhere ----------------------------------------------------------

@@ -180,6 +180,7 @@ def test_motion_around_half_is_found_with_its_unit(tmp_path, form, kind, most):
     assert (motion_of(told)[0, -1] == 0).all()  # the middle of whole numbers does not move
 
 
+@pytest.mark.full
 def test_where_nothing_was_drawn_vectors_around_half_do_not_move(tmp_path):
     for n in NUMBERS:
         samples = in_bits(three(0.5 + to_next(n) * UP / 64), np.uint16)
@@ -303,6 +304,7 @@ UNITS = {  # numbers of a motion to the next frame [px, y down]: as programs wri
     "of the longest motion": (lambda v: UP * v / 32 + 0.5, "Motion vector.R,Motion vector.G",
                               "(1 is 32 px)"),
     "clamped velocity": (lambda v: UP * v / 40 + 0.5, "velocity.R,velocity.G", "vray scale "),
+    "fractions, all negative": (lambda v: -v / SIZE, "velocity.R,velocity.G", "flip x (fractions"),
 }  # fmt: skip
 
 
@@ -310,8 +312,8 @@ UNITS = {  # numbers of a motion to the next frame [px, y down]: as programs wri
 @pytest.mark.parametrize(
     "unit",
     [
-        *list(UNITS)[3:5],
-        *in_full(*list(UNITS)[:3], *list(UNITS)[5:]),
+        *list(UNITS)[3:4],
+        *in_full(*list(UNITS)[:3], *list(UNITS)[4:]),
     ],
 )
 def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
@@ -321,7 +323,7 @@ def test_the_unit_of_vectors_is_found(tmp_path, unit, kind):
     is_right(clip, 0.05)
 
 
-@pytest.mark.parametrize("unit", ["-1 to 1, backwards", *in_full("of the longest motion")])
+@pytest.mark.parametrize("unit", in_full("-1 to 1, backwards", "of the longest motion"))
 def test_what_crosses_half_of_the_picture_does_not_hide_the_unit(tmp_path, unit):
     """Numbers of a few pixels lie beyond -1 and 1, or 0 and 1."""
     numbers, names, _ = UNITS[unit]
@@ -396,6 +398,7 @@ ONE_WAY = (
     "rgba_motionvector.red,rgba_motionvector.green", "flow.u,flow.v",
     "ViewLayer.Motion Vectors.R,ViewLayer.Motion Vectors.G",
     "_CameraMotionVectorsTexture.R,_CameraMotionVectorsTexture.G",
+    "XVector,YVector", "X Motion,Y Motion", "vector.X,vector.Y",
 )  # fmt: skip
 
 
@@ -429,7 +432,7 @@ def test_other_vectors_are_not_motion(tmp_path, name):
 
 
 def test_a_layer_around_a_half_is_named_with_its_option(tmp_path, capsys):
-    """As Corona's CGeometry_VelocityField, or a name in another language."""
+    """A name in another language."""
     names = "Bewegung.R,Bewegung.G"
     pattern = of_layers(tmp_path, lambda n: {names: to_next(n) * UP / 64 + 0.5})
     _, out, _ = make.inside(capsys, "info", pattern)
@@ -452,6 +455,9 @@ def test_directions_and_constants_are_no_candidates():
     small = np.zeros((64, 64), np.float32)
     small[5:11, 5:11] = -3
     assert vectors.candidates({"a.R": small, "a.G": small}) == ["a"]
+    four = {"a.R": small, "a.G": small, "a.B": 0 * small}
+    assert vectors.candidates(four | {"a.A": 0 * small + 1}) == ["a"]
+    assert vectors.candidates(four | {"a.A": small}) == []
 
 
 def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys):
@@ -460,6 +466,18 @@ def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys
     assert code == 0
     assert "warp has negative numbers; --vector-layer warp takes warp" in out
     is_right(Clip(pattern, passes=Passes(vectors=Vectors(layer="warp"))), 0)
+
+
+@pytest.mark.parametrize("numbers", [(5,), *in_full(NUMBERS)])
+def test_a_vector_pass_in_a_file_of_its_own_is_blenders(tmp_path, numbers):
+    """The compositor's File Output writes it as R, G, B and A."""
+    for n in numbers:
+        back, ahead = make.motion(n)
+        make.write_exr(tmp_path / f"Vector{n:04d}.exr", rgb(np.dstack([back * UP, -ahead * UP])))
+    also = (str(tmp_path / "Vector####.exr"),)
+    clip = Clip(beauty(tmp_path, numbers), passes=Passes(also=also))
+    np.testing.assert_array_equal(motion_of(clip), np.dstack(make.motion(5)))
+    assert not clip.is_finding_notable
 
 
 # ---- no vectors -----------------------------------------------------------------------------

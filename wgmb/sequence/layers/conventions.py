@@ -58,7 +58,8 @@ CONVENTIONS: dict[str, Convention] = {
     ),
     "rsmb": Convention(
         "0..1, 0.5 is no motion, y up, to the next frame; scale by 2 x MaxDisplace",
-        ("rsmb", "mv2dtoxik", "mv2dtoonz", "mv2d", "lm2dmv", "2dmotionvector"),
+        ("rsmb", "mv2dtoxik", "mv2dtoonz", "mv2d", "lm2dmv", "2dmotionvector",
+         "velocityfield"),
         None,
         (0, 1),
         (1, -1),

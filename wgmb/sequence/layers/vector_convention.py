@@ -73,6 +73,8 @@ class ConventionFinder:
             return self._none_found(self._stored.files.on_disk[0])
         if self._wanted.convention != "auto":
             return self._as_told(first)
+        if first.sure and not first.notable:
+            return first
         found = self._best([first, self._test(_picture, 1)])
         if found.is_failed:  # the light may have changed everywhere
             of_surfaces = [self._test(self._surfaces, which) for which in (0, 1)]
@@ -110,14 +112,24 @@ class ConventionFinder:
                     return found
                 own = named[which]
                 if self._wanted.is_told:
-                    return vector_test.ConventionFinding(own, False, str(own))
+                    return self._untested(source, own)
                 evidence.append(self._evidence(source, own, look))
                 has_both = self._has_both(source, own)
-                found = vector_test.decide(own, evidence, has_both=has_both)
+                is_named = vectors.is_direction_named(
+                    self._stored.own(source), own, source.reference_channel
+                )
+                found = vector_test.decide(own, evidence, has_both=has_both, is_named=is_named)
                 seen = {side for e in evidence for side in e.sides}
                 if found.sure and found.vectors == own and (len(seen) == 2 or not has_both):
                     break
         return found
+
+    def _untested(self, source: FrameFile, own: vectors.Vectors) -> vector_test.ConventionFinding:
+        """The finding about vectors of which everything was told, except perhaps their unit."""
+        motion = vectors.read(self._stored.own(source), own, source.reference_channel)
+        lacking = vector_test.gathered(motion, motion, None, None, source.whole).unit_lacking(own)
+        text = f"{own}; {lacking}" if lacking else str(own)
+        return vector_test.ConventionFinding(own, False, text, notable=bool(lacking))
 
     def _surfaces(self, source: FrameFile) -> np.ndarray | None:
         """(height, width, 3) colour of surfaces, whatever light falls on them, if it is there."""

@@ -40,7 +40,9 @@ _CLEARLY = 0.75  # another reading must leave less than this share of the differ
 _ALIKE = 1.02  # of the least difference: as good
 _MATTERS = 0.05  # of the unmoved difference: what another reading must at least explain more
 _BLOCK = 4  # [px] side of the squares whose means tell whether two pictures differ
-_CHANGED = 0.06  # difference of such means, of tones, which is no noise
+_CHANGED = 0.06  # difference of such means, of tones, which is no noise,
+_OF_LIGHT = 0.2  # or this share of the brighter tones, in the dark
+_BRIGHTER = 0.95  # quantile of the tones
 _CHANGES = 4, 0.001  # such squares: so many at least, and this share of all
 
 
@@ -87,6 +89,22 @@ class Evidence:
         """The vectors are so short that they may have another unit than pixels."""
         return self.is_below or self.fastest < _ACROSS
 
+    def unit_lacking(self, vectors: Vectors) -> str:
+        """The option that vectors below a pixel need if their unit is unknown; "" for others."""
+        is_known = vectors.scale != 1 or vectors.convention == "blender"
+        if is_known or not self.is_below or self.fastest <= _NOTHING:
+            return ""
+        if vectors.middle:
+            return (
+                "they are all below a pixel, and nothing tells their unit: `vector_scale` is twice "
+                "the longest motion in pixels"
+            )
+        width, height = self.whole
+        return (
+            "they are all below a pixel: if they are fractions of the picture, "
+            f"`vector_scale={width},{height}` makes them pixels"
+        )
+
     @property
     def count(self) -> int:
         """Number of probes."""
@@ -110,22 +128,22 @@ def gathered(
         for side, m, c in ((-1, motion[..., :2], prev), (1, motion[..., 2:], next_))
         if c is not None and c.shape[:2] == color.shape[:2]
     }
-    if not sides:
-        return Evidence(doubt="no neighbouring frame to test it on")
-    speeds = _speeds([m for m, _ in sides.values()])
+    speeds = _speeds([m for m, _ in sides.values()] or [motion[..., :2], motion[..., 2:]])
     moving = speeds > _MOVING
     fastest, is_below = _fastest(speeds), int(np.count_nonzero(moving)) < _FEWEST
+    of = {"fastest": fastest, "is_below": is_below, "whole": whole or color.shape[1::-1]}
+    if not sides:
+        return Evidence(doubt="no neighbouring frame to test it on", **of)
     at = _some(moving if fastest >= _ACROSS else speeds > max(_SLOW * fastest, _NOTHING))
     if is_below:
         here = tone(color[..., :3])
-        differs = any(_differ(here, tone) for _, tone in sides.values())
-        if not differs or len(at) < _FEWEST:
-            return Evidence(fastest=fastest, is_below=True, differs=differs, doubt=_NOTHING_MOVES)
+        of["differs"] = any(_differ(here, tone) for _, tone in sides.values())
+        if len(at) < _FEWEST:
+            return Evidence(doubt=_NOTHING_MOVES, **of)
     y, x = at.T
     tones, places = tone(color[y, x, :3]), at[:, ::-1].astype(np.float32)
     lookups = [(tones, places, m[y, x], tone) for m, tone in sides.values()]
-    size = whole or color.shape[1::-1]
-    return Evidence(lookups, tuple(sides), fastest, is_below, is_below, size)
+    return Evidence(lookups, tuple(sides), **of)
 
 
 _NOTHING_MOVES = "nothing moves, so it cannot be tested"
@@ -160,13 +178,18 @@ _STATED = _Reading()
 
 
 def decide(
-    vectors: Vectors, evidence: Sequence[Evidence], *, has_both: bool = False
+    vectors: Vectors,
+    evidence: Sequence[Evidence],
+    *,
+    has_both: bool = False,
+    is_named: bool = True,
 ) -> ConventionFinding:
     """Test `vectors`, as which all motion in the evidence was read; frames are taken together.
 
     Every reading warps the neighbours; the one that leaves the least difference is meant. The
     stated one is kept unless another leaves less than _CLEARLY of its difference, and explains
-    _MATTERS more. `has_both`: those to either side were stored, so one may be turned.
+    _MATTERS more. `has_both`: those to either side were stored, so one may be turned. `is_named`:
+    their name says which way y points.
     """
     tested = [e for e in evidence if e.lookups]
     tested = [e for e in tested if not e.is_below] or tested
@@ -176,17 +199,19 @@ def decide(
         if evidence and all(e.is_below for e in evidence) and any(e.differs for e in evidence):
             return zero
         doubts = [e.doubt for e in evidence if e.doubt] or ["no frame to test it on"]
-        return ConventionFinding(vectors, False, f"{vectors}, by name ({doubts[-1]})")
+        return _untested(vectors, doubts[-1], evidence, is_named)
     probes = _Probes(tested, _PROBES)
     still = probes.difference(_Reading(x=0.0, y=0.0))
     if still == 0:
-        text = f"{vectors}, by name (moving parts look the same in all frames: not testable)"
-        return ConventionFinding(vectors, False, text)
+        doubt = "moving parts look the same in all frames: not testable"
+        return _untested(vectors, doubt, evidence, is_named)
     stated = probes.difference(_STATED)
     best, left = _best(tested, probes, vectors, stated, has_both)
     if left > min(_CLEARLY * stated, stated - _MATTERS * still):
         best, left = _STATED, stated
     if left > _EXPLAINS * still:
+        if tested[0].is_below and not any(e.differs for e in tested):
+            return ConventionFinding(vectors, False, f"{vectors}, by name ({_NOTHING_MOVES})")
         if tested[0].is_below:
             text = f"{vectors}, {_BELOW}"
             return zero if is_zero else ConventionFinding(vectors, False, text, notable=True)
@@ -204,6 +229,19 @@ def decide(
         f"{meant}{_unit(best, tested[0])}, because {why}, and {stated / still:.0%} with {vectors}"
     )
     return ConventionFinding(meant, True, text, notable=True, left=left / still)
+
+
+def _untested(
+    vectors: Vectors, doubt: str, evidence: Sequence[Evidence], is_named: bool
+) -> ConventionFinding:
+    """The finding about vectors that cannot be tested, with the options that may be needed."""
+    moving = [e for e in evidence if e.doubt != _NOTHING_MOVES and e.fastest > _NOTHING]
+    units = [e.unit_lacking(vectors) for e in moving]
+    lacking = [units[0]] if units and all(units) else []
+    if moving and not is_named and not vectors.flip:
+        lacking.append("y is taken to point down: `vector_flip=y` takes it as up")
+    text = "; ".join([f"{vectors}, by name ({doubt})", *lacking])
+    return ConventionFinding(vectors, False, text, notable=bool(lacking))
 
 
 def _unit(reading: _Reading, evidence: Evidence) -> str:
@@ -375,6 +413,8 @@ def _differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Return True if two pictures' tones differ by more than noise, somewhere."""
     height, width = (_BLOCK * (side // _BLOCK) for side in a.shape[:2])
     apart = a[:height, :width].astype(np.float32) - b[:height, :width]
+    light = float(max(np.quantile(tones[::3, ::3], _BRIGHTER) for tones in (a, b)))
+    least = min(_CHANGED, _OF_LIGHT * light)
     blocks = apart.reshape(height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK, 3).mean(axis=(1, 3))
-    changed, (fewest, share) = np.abs(blocks).max(axis=2) > _CHANGED, _CHANGES
+    changed, (fewest, share) = np.abs(blocks).max(axis=2) > least, _CHANGES
     return int(changed.sum()) >= max(fewest, share * changed.size)

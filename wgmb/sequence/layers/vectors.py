@@ -29,7 +29,9 @@ from .names import (
 )
 
 _BACKWARD = ("backward", "toprev", "motionback", "backvector", "backwardvector", "backwardflow")
-_PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?(?P<axis>[xyuvXYUV])")
+_DOWN = ("toprev", "tonext")  # layers whose y points down, as wgmb and flow files write them
+_PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?[xyuvXYUV]")
+_PAIR_BEHIND = re.compile(r"(?:(?P<layer>.+)\.)?[xyuvXYUV][ _-]?(?P<stem>[A-Z][A-Za-z_ -]+)")
 _UNIT = 0.02  # from 1: the length of a unit vector, in half floats
 _STEP = 1 / 255  # of 8 bits, by which 0.5 may be off
 _MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
@@ -153,10 +155,15 @@ def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> l
     """Layers that may hold vectors under a name that does not say so.
 
     They have two channels, or three, with negative numbers or 0.5 where nothing moves, are no unit
-    vectors, and those of three are not called as places or directions in space.
+    vectors, and those of three are not called as places or directions in space. An alpha that is
+    1 everywhere is no channel of theirs.
     """
     found = []
-    for layer, members in layers(channels, near).items():
+    for layer, all_members in layers(channels, near).items():
+        is_opaque = component(all_members[-1]) in ("a", "alpha") and np.all(
+            channels[all_members[-1]] == 1
+        )
+        members = all_members[:-1] if is_opaque else all_members
         if not layer or len(members) not in (2, 3) or (len(members) == 3 and is_of_space(layer)):
             continue
         planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
@@ -190,12 +197,14 @@ def named_as_flow(planes: Mapping[str, np.ndarray], title: str) -> dict[str, np.
 
 
 def _layers(names: Iterable[str], near: str | None) -> dict[str, list[str]]:
-    """Channels by layer; also of layers whose names stand before X and Y, as in `BackVectorX`."""
+    """Channels by layer; also of layers whose names stand beside X and Y, as in `BackVectorX`."""
     names = list(names)
     found, pairs = layers(names, near), dict[str, list[str]]()
     for name in sorted(names):
-        if (m := _PAIR.fullmatch(name)) and ending(m["stem"], STEMS):
-            pairs.setdefault(".".join(filter(None, (m["layer"], m["stem"]))), []).append(name)
+        for form in (_PAIR, _PAIR_BEHIND):
+            if (m := form.fullmatch(name)) and ending(m["stem"], STEMS):
+                pairs.setdefault(".".join(filter(None, (m["layer"], m["stem"]))), []).append(name)
+                break
     return found | {k: members for k, members in pairs.items() if len(members) == 2}
 
 
@@ -229,12 +238,14 @@ def readings(
 
     Numbers from 0 to 1 may have 0.5 for no motion, whatever their layer is called; those of a layer
     that should have it, but lie around 0, have 0. Fractions of a picture, of the size `whole`,
-    become pixels.
+    become pixels. A Vector pass of Blender in a file of its own has its numbers in R, G, B and A.
     """
     vectors = in_pixels(vectors, whole)
     if vectors.offset is not None or vectors.convention == "blender":
         return [vectors]
     sides = channels_of(channels, vectors, near)
+    if blenders := _as_blenders(channels, vectors, sides, near):
+        return [blenders, vectors]
     planes = np.stack(
         [channels[name][::3, ::3].ravel() for pair in sides.values() for name in pair]
     )
@@ -242,7 +253,8 @@ def readings(
     if not planes.size:
         return [vectors]
     if vectors.middle:
-        return [replace(vectors, offset=0.0) if _are_around(planes, 0) else vectors]
+        plain = replace(vectors, offset=0.0)
+        return [plain, vectors] if _are_around(planes, 0) else [vectors, plain]
     low, high = np.quantile(planes, (1 - _NEARLY, _NEARLY))  # what is too fast may lie beyond
     if low < 0 or high > 1:
         return [vectors]
@@ -252,6 +264,26 @@ def readings(
     else:
         coded = replace(vectors, offset=0.5)
     return [coded, vectors] if _are_around(planes, 0.5) else [vectors, coded]
+
+
+def _as_blenders(
+    channels: Mapping[str, np.ndarray],
+    vectors: Vectors,
+    sides: Mapping[str, tuple[str, str]],
+    near: str | None,
+) -> Vectors | None:
+    """`vectors` as a Vector pass in R, G, B and A, if they are called so and B and A are motion."""
+    if vectors.convention != "plain" or list(sides) != ["next"]:
+        return None
+    layer = _layer_of(channels, sides["next"], near)
+    members = _layers(channels, near)[layer]
+    is_called_so = ending(layer, CONVENTIONS["blender"].stems) is not None
+    if not is_called_so or [component(name) for name in members] != ["r", "g", "b", "a"]:
+        return None
+    planes = np.stack([channels[name][::3, ::3] for name in members[2:]])
+    with np.errstate(invalid="ignore"):
+        is_motion = ((planes < 0) | ((planes > 1) & (planes < NOWHERE))).any()
+    return replace(vectors, convention="blender", layer=layer) if is_motion else None
 
 
 def _are_around(planes: np.ndarray, middle: float) -> bool:
@@ -300,6 +332,14 @@ def channels_of(
             raise InputError(f"vector layer needs {max(x, y) + 1} components, has {len(members)}")
         result.setdefault(side, (members[x], members[y]))
     return result
+
+
+def is_direction_named(names: Iterable[str], vectors: Vectors, near: str | None = None) -> bool:
+    """True if the names of the layers say which way y points: all but those of no program's own."""
+    if vectors.convention != "plain":
+        return True
+    sides = channels_of(names, vectors, near)
+    return all(ending(_layer_of(names, pair, near), _DOWN) for pair in sides.values())
 
 
 def read(
