@@ -1,6 +1,7 @@
 """A folder of frames as programs write it, and presets by program."""
 
 import shutil
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -40,6 +41,13 @@ LAYOUTS = {
     "folders": ("beauty/s010.####.exr", "mv/s010.####.exr", "depth/s010.####.exr"),
     "numbers": ("beauty/####.exr", "vectors/####.exr", "depth/####.exr"),
 }
+SINGLES = {
+    "files": ("beauty.exr", "vectors.exr", "depth.exr"),
+    "shot": ("shot.exr", "shot_motionvector.exr", "shot_Z.exr"),
+    "folders": ("rgba/shot.exr", "velocity/shot.exr", "depth/shot.exr"),
+    "a version": ("beauty.exr", "vectors_v2.exr", "depth.exr"),
+    "one number": ("beauty.0005.exr", "vectors.exr", "depth.exr"),
+}
 
 
 @pytest.mark.fast
@@ -53,6 +61,39 @@ def test_picture_vectors_and_depth_are_found_by_their_names(tmp_path, layout):
     assert found.text.endswith(
         f": picture {names[0]}, vectors {names[1]}, depth {names[2]} (3 frames)"
     )
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("layout", SINGLES)
+def test_a_single_frame_is_a_sequence_of_one(tmp_path, layout):
+    for name in SINGLES[layout]:
+        write(tmp_path, name)
+    for name in ("thumbs.txt", ".beauty.exr"):
+        (tmp_path / name).write_text("")
+    found = frames_in(tmp_path)
+    files = [Path(p).relative_to(tmp_path).as_posix() for p in (found.pattern, *found.also)]
+    assert [one.replace("####", "0005").replace("v#", "v2") for one in files] == [*SINGLES[layout]]
+    assert found.text.endswith("(1 frame)")
+
+
+def test_a_single_frame_in_a_folder_is_blurred(tmp_path, capsys):
+    write(tmp_path / "r", *SINGLES["files"])
+    code, _, said = make.inside(capsys, "blur", tmp_path / "r", "-o", f"{tmp_path}/out/")
+    assert code == 0
+    assert "picture beauty.exr, vectors vectors.exr, depth depth.exr (1 frame)" in said
+    (frame,) = Clip(tmp_path / "out" / "beauty.exr")
+    assert np.abs(frame.color - make.picture(6)[..., :3]).max() > 0.1
+
+
+@pytest.mark.fast
+def test_passes_of_other_frames_are_left_out_and_named(tmp_path):
+    write(tmp_path, "beauty.####.exr", "depth.####.exr")
+    for n in NUMBERS:
+        (tmp_path / f"depth.{n:04}.exr").rename(tmp_path / f"mv.{1000 + n}.exr")
+    found = frames_in(tmp_path)
+    assert not found.also
+    left_out = "vectors mv.####.exr left out, as they are frames 1004-1006"
+    assert found.text.endswith(f"; {left_out}, and the picture is frames 4-6")
 
 
 def test_a_folder_is_blurred_in_one_command(tmp_path, capsys):
@@ -105,8 +146,8 @@ def test_both_directions_and_own_vectors_are_taken(tmp_path):
         (("a.####.exr", "mv.####.exr", "velocity.####.exr"),
          r"vectors may be mv.####.exr or velocity.####.exr; `also` takes one"),
         (("a.####.exr", "z.####.exr", "depth.####.exr"), r"depth may be .*`also`"),
-        (("mv.####.exr", "z.####.exr"), "without a sequence of pictures.*mv.####.exr, z.####.exr"),
-        ((), "without a sequence of pictures"),
+        (("mv.####.exr", "z.####.exr"), "without pictures.*mv.####.exr, z.####.exr"),
+        ((), "without pictures"),
     ],
 )  # fmt: skip
 def test_two_that_are_as_good_are_named(tmp_path, names, text):

@@ -177,6 +177,12 @@ def sequences_in(folder: str | Path) -> list[Path]:
     return [Path(folder) / name for name in sorted(shortest.values())]
 
 
+def singles_in(folder: str | Path) -> list[Path]:
+    """The files in a folder that have no number, hidden ones apart."""
+    names = [name for name in os.listdir(folder) if name[0] != "." and not _COUNTED.search(name)]
+    return [path for name in sorted(names) if (path := Path(folder) / name).is_file()]
+
+
 def title(path: str | Path) -> str:
     """The name of a file or pattern without number, view and ending."""
     return _title(path)

@@ -11,7 +11,16 @@ from pathlib import Path
 from ..errors import InputError, counted
 from ..io import exr
 from ..io.data_files import FLO
-from ..io.frame_numbers import frame_path, numbers_on_disk, sequences_in, title
+from ..io.frame_numbers import (
+    frame_path,
+    is_pattern,
+    number_in,
+    numbered,
+    numbers_on_disk,
+    sequences_in,
+    singles_in,
+    title,
+)
 from .layers import light, names, vectors
 
 _KINDS = (".exr", FLO, ".tif", ".tiff", ".png", ".jpg", ".jpeg")
@@ -37,14 +46,25 @@ class FolderFrames:
 
 @dataclass(frozen=True)
 class _Sequence:
-    """A sequence in a folder, or in a folder within."""
+    """A sequence in a folder or a folder within; a file without a number is a sequence of one."""
 
     pattern: Path
     folder: Path
 
     @cached_property
     def numbers(self) -> frozenset[int]:
+        if self.is_single:
+            return frozenset((number_in(self.pattern),))
         return frozenset(numbers_on_disk(self.pattern))
+
+    @property
+    def is_single(self) -> bool:
+        """True for a file without a number."""
+        return not is_pattern(self.pattern)
+
+    def goes_with(self, picture: _Sequence) -> bool:
+        """True if it has frames of the picture; a file without a number goes with a single one."""
+        return self.is_single or picture.is_single or bool(self.numbers & picture.numbers)
 
     @cached_property
     def titles(self) -> list[str]:
@@ -103,7 +123,8 @@ def frames_in(folder: str | Path, also: tuple[str, ...] = (), leave_out: str = "
     base = Path(folder)
     there = [s for s in _sequences(base) if not leave_out or s.pattern != Path(leave_out)]
     picture = _picture(base, there)
-    rest = [s for s in there if s is not picture and s.numbers & picture.numbers]
+    others = [s for s in there if s is not picture]
+    rest = [s for s in others if s.goes_with(picture)]
     beside: dict[str, list[_Sequence]] = {"vectors": [], "depth": []}
     if not also and not picture.has_vectors:
         found = (_one(base, rest, "vectors", lambda s, d=d: s.direction == d) for d in (1, -1))
@@ -114,29 +135,55 @@ def frames_in(folder: str | Path, also: tuple[str, ...] = (), leave_out: str = "
     own = [f"picture {picture}"]
     own += [f"{kind} {' and '.join(map(str, some))}" for kind, some in beside.items() if some]
     text = f"{base}: {', '.join(own)} ({counted(len(picture.numbers), 'frame')})"
+    if not also:
+        needed = {
+            "vectors": not picture.has_vectors and not beside["vectors"],
+            "depth": names.find_depth(picture.channels) is None and not beside["depth"],
+        }
+        text += _left_out(picture, [s for s in others if s not in rest], needed)
     patterns = tuple(str(s.pattern) for some in beside.values() for s in some)
     return FolderFrames(str(picture.pattern), also or patterns, text)
 
 
+def _left_out(picture: _Sequence, others: list[_Sequence], needed: dict[str, bool]) -> str:
+    """The end of the line about passes that would be taken if their frames had the same numbers."""
+    kinds = {"vectors": lambda s: s.direction is not None, "depth": lambda s: s.is_depth}
+    text = ""
+    for kind in (kind for kind, is_needed in needed.items() if is_needed):
+        for one in [s for s in others if kinds[kind](s)][:1]:
+            own, wanted = (numbered(sorted(s.numbers)) for s in (one, picture))
+            text += f"; {kind} {one} left out, as they are {own}, and the picture is {wanted}"
+    return text
+
+
 def _sequences(base: Path) -> list[_Sequence]:
+    """The sequences; if none has a second frame, files without a number too."""
     try:
         within = sorted(p for p in base.iterdir() if p.is_dir() and not p.name.startswith("."))
-        found = [_Sequence(p, base) for one in (base, *within) for p in sequences_in(one)]
+        folders = base, *within
+        found = _of_kinds(base, [p for one in folders for p in sequences_in(one)])
+        if all(len(s.numbers) == 1 for s in found):
+            found += _of_kinds(base, [p for one in folders for p in singles_in(one)])
     except OSError as error:
         raise InputError(f"{base}: {(error.strerror or str(error)).lower()}") from None
-    return [s for s in found if s.pattern.suffix.lower() in _KINDS]
+    return found
+
+
+def _of_kinds(base: Path, patterns: Iterable[Path]) -> list[_Sequence]:
+    return [_Sequence(p, base) for p in patterns if p.suffix.lower() in _KINDS]
 
 
 def _picture(base: Path, sequences: list[_Sequence]) -> _Sequence:
     """The sequence that is blurred: one that is called as the picture, or else as no other pass."""
     images = [s for s in sequences if s.pattern.suffix.lower() != FLO]
     able = images if len(images) == 1 else [s for s in images if not s.is_other]
+    able = [s for s in able if not s.is_single] or able
     called = [s for s in able if s.says(names.is_color)]
     holding = [s for s in called or able if s.has_vectors]
     chosen = _best(holding or called or able)
     if not chosen:
         held = f"; it holds {', '.join(map(str, sequences))}" if sequences else ""
-        raise InputError(f"{base}: a folder without a sequence of pictures or videos{held}")
+        raise InputError(f"{base}: a folder without pictures or videos{held}")
     if len(chosen) > 1:
         raise InputError(
             f"{base}: the picture may be {chosen[0]} or {chosen[1]}; name one instead of the "
