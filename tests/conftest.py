@@ -62,6 +62,12 @@ def as_without_a_gpu(device, monkeypatch):
     monkeypatch.setattr(gpu, "SOFTWARE", device.adapter_info["adapter_type"])
 
 
+@pytest.fixture
+def as_with_a_gpu(monkeypatch):
+    """The ways of a GPU, on any device."""
+    monkeypatch.setattr(gpu, "SOFTWARE", "no device")
+
+
 @pytest.fixture(scope="session")
 def mixing(device):
     """The greatest error of a colour of 0..1 that this device's sampler mixes of four texels."""

@@ -8,23 +8,17 @@ import wgpu
 
 import wgmb
 from twins import dense as twin
-from wgmb import gpu
 from wgmb.color.srgb import to_display
 from wgmb.errors import InputError
 from wgmb.flow.dense import DenseInverseSearch
 from wgmb.flow.dense.stages import STATE, sizes_of
+from wgmb.lab.calls import counted
 from wgmb.run.video import VideoRequest
 from wgmb.settings import BlurSettings
 from wgmb.settings.video import VideoSettings
 
 WIDTH, HEIGHT, SIDE, SPEED = 336, 112, 40, 48
 FIRST = 2  # so that the picture in the middle, 3, has the first layer of the pyramid
-
-
-@pytest.fixture
-def as_with_a_gpu(monkeypatch):
-    """The ways of a GPU, on any device."""
-    monkeypatch.setattr(gpu, "SOFTWARE", "no device")
 
 
 def soft(width, height, cell, seed):
@@ -180,37 +174,21 @@ def test_the_motion_of_a_picture_depends_on_its_neighbours_alone(device):
     np.testing.assert_array_equal(source.shot(part.get)(4)[0], wanted[4][0])
 
 
-def test_a_picture_is_one_submission_that_waits_for_nothing(device, monkeypatch):
+def test_a_picture_is_one_submission_that_waits_for_nothing(device):
     """And no texture, view, buffer or bind group is made once the first pictures are done."""
-    counts = dict.fromkeys(("passes", "submits", "made"), 0)
-
-    def counted(owner, method, name):
-        real = getattr(owner, method)
-
-        def call(self, *args, **more):
-            counts[name] += 1
-            return real(self, *args, **more)
-
-        monkeypatch.setattr(owner, method, call)
-
-    pictures = {n: device.create_texture(size=(192, 96, 1), format="rgba32float",
-                usage=wgpu.TextureUsage.TEXTURE_BINDING) for n in range(12)}  # fmt: skip
-    same = pictures[0]
-    shot = DenseInverseSearch(device=device).shot(lambda n: same if n in pictures else None)
+    picture = device.create_texture(
+        size=(192, 96, 1), format="rgba32float", usage=wgpu.TextureUsage.TEXTURE_BINDING
+    )
+    shot = DenseInverseSearch(device=device).shot(lambda n: picture if 0 <= n < 12 else None)
     for number in range(7):
         shot.textures(number)
-    backend = type(device)
-    counted(type(device.create_command_encoder()), "begin_compute_pass", "passes")
-    counted(type(device.queue), "submit", "submits")
-    for method in ("create_texture", "create_buffer", "create_bind_group"):
-        counted(backend, method, "made")
-    counted(type(same), "create_view", "made")
-    counted(wgpu.GPUBuffer, "map_sync", "submits")
-    for number in range(7, 10):
-        shot.textures(number)
+    with counted() as counts:
+        for number in range(7, 10):
+            shot.textures(number)
     levels = len(sizes_of((192, 96)))
     assert levels == 4
-    assert counts == {"passes": 3 * (3 * levels + 13), "submits": 3, "made": 0}
+    each = {"dispatches": 3 * levels + 13, "passes": 2, "submits": 1}
+    assert counts == {kind: 3 * many for kind, many in each.items()}
 
 
 def test_pictures_that_are_alone_or_of_another_size(device):

@@ -136,7 +136,7 @@ def settled(
 
 def _read(passes: FlowPasses, thin: wgpu.GPUTexture) -> np.ndarray:
     """(count, 4) the output of a pass for a few pixels."""
-    return passes.images.download(passes.device.create_command_encoder(), thin).reshape(-1, 4)
+    return passes.read(thin).reshape(-1, 4)
 
 
 def _run(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import wgpu
 
 from .. import gpu
@@ -20,8 +21,9 @@ STATES, FEATURES = ("rgba32float", 2), ("rgba8unorm", 2)  # format, layers
 class FlowPasses:
     """Runs passes, and lends textures that may be given back for the next frame's.
 
-    Every pass is submitted by itself, and without a GPU the long ones in bands: a frame takes
-    seconds there, and a submission cannot be interrupted.
+    Passes are gathered until `submit`, which is due before others write what they read, and before
+    others read what they write. Without a GPU every pass is submitted by itself, the long ones in
+    bands: a frame takes seconds there, and a submission cannot be interrupted.
     """
 
     def __init__(self, device: wgpu.GPUDevice):
@@ -29,8 +31,9 @@ class FlowPasses:
         self._in_software = device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self.linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self.landings, self.costs = (ScratchBuffer(device) for _ in range(2))
+        self._gathered: gpu.Tape | None = None
         self._free: dict[tuple[tuple[int, int], tuple[str, int]], list[wgpu.GPUTexture]] = {}
-        self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
+        self._frame = gpu.SizeBindings(device)
         self._lent: set[int] = set()  # uids of textures that stay
         self._views: dict[tuple[int, str], wgpu.GPUTextureView] = {}  # of these
 
@@ -55,10 +58,29 @@ class FlowPasses:
             if "band" in kernel.bindings:
                 whole = -(-height // kernel.workgroup[1])
                 bound["band"] = self.uniform("band.wgsl", "Band", first=first, rows=whole)
-            encoder = self.device.create_command_encoder(label=f"flow {entry}")
             part = replace(self._frame(size), size=(width, rows * kernel.workgroup[1]))
-            kernel.run(encoder, entry, part, **bound)
-            gpu.submit(self.device, encoder)
+            if self._gathered is None:
+                self._gathered = gpu.Tape(part)
+            kernel.run(self._gathered, entry, part, **bound)
+            if self._in_software:
+                self.submit()
+
+    def submit(self) -> None:
+        """Submit the passes that are gathered."""
+        if self._gathered is not None:
+            gpu.submit(self.device, self._recorded())
+
+    def read(self, texture: wgpu.GPUTexture) -> np.ndarray:
+        """(height, width, channels) contents of a texture after all passes, which are submitted."""
+        return self.images.download(self._recorded(), texture)
+
+    def _recorded(self) -> wgpu.GPUCommandEncoder:
+        """An encoder with the passes that are gathered; none are afterwards."""
+        encoder = self.device.create_command_encoder(label="flow")
+        gathered, self._gathered = self._gathered, None
+        if gathered is not None:
+            gathered.play(encoder)
+        return encoder
 
     def _bands(self, kernel: gpu.Kernel, width: int, height: int) -> Iterator[tuple[int, int]]:
         """The first row of workgroups, and how many, of every submission of a pass."""
@@ -77,7 +99,7 @@ class FlowPasses:
     def take(self, size: tuple[int, int], kind: tuple[str, int]) -> wgpu.GPUTexture:
         """A texture of a format and so many layers; its contents are undefined."""
         if free := self._free.get((size, kind)):
-            return free.pop()
+            return free.pop(0)  # in turns, so that the same passes have the same textures again
         gpu.check_size(self.device, *size)
         usage = _USAGE.TEXTURE_BINDING | _USAGE.STORAGE_BINDING | _USAGE.COPY_SRC | _USAGE.COPY_DST
         made = self.device.create_texture(
@@ -98,11 +120,6 @@ class FlowPasses:
         texture = self.images.texture(f"{name} {size[0]} x {size[1]}", size, format)
         self._lent.add(texture.uid)
         return texture
-
-    def _frame(self, size: tuple[int, int]) -> gpu.FrameBindings:
-        if size not in self._frames:
-            self._frames[size] = gpu.FrameBindings.of_size(self.device, size)
-        return self._frames[size]
 
     def _bound(self, kernel: gpu.Kernel, name: str, value: Any) -> Any:
         if not isinstance(value, wgpu.GPUTexture):

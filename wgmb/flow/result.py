@@ -85,7 +85,7 @@ def _homographies(
     passes: FlowPasses, thin: wgpu.GPUTexture, size: tuple[int, int], spacing: int
 ) -> list[np.ndarray]:
     """The motion of most of the picture to the previous frame and to the next one."""
-    some = passes.images.download(passes.device.create_command_encoder(), thin)
+    some = passes.read(thin)
     y, x = np.mgrid[: some.shape[0], : some.shape[1]]
     last = np.array(size) - 1
     points = np.minimum(np.stack([x, y], axis=-1) * spacing + spacing // 2, last) + 0.5

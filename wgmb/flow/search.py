@@ -66,9 +66,7 @@ class FullSearch:
         few = min(blocks[0], ACROSS), min(blocks[1], ACROSS)
         ways = self._passes.take(few, STATES)
         run("write_ways", few, 0, ways)
-        found = self._passes.images.download(
-            self._passes.device.create_command_encoder(), ways
-        ).reshape(-1, 4)
+        found = self._passes.read(ways).reshape(-1, 4)
         self._passes.give(spare, ways)
         centres = np.minimum(block * spaced(few, blocks), np.array(size) - 1) + 0.5
         return output, centres, found

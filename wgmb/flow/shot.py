@@ -119,7 +119,9 @@ class Shot:
         """
         if self._features(number) is None:
             return None
-        return self._once("motion", number, 0, self._motion)
+        made = self._once("motion", number, 0, self._motion)
+        self._passes.submit()
+        return made
 
     def __call__(self, number: int) -> tuple[np.ndarray, np.ndarray] | None:
         """(height, width, 4) to_prev, to_next [px] and (height, width) depth of a frame."""
@@ -127,11 +129,7 @@ class Shot:
             textures = self.textures(number)
             if textures is None:
                 return None
-            images, device = self._passes.images, self._passes.device
-            motion, depth = (
-                images.download(device.create_command_encoder(), texture)
-                for texture in (textures.motion, textures.depth)
-            )
+            motion, depth = (self._passes.read(t) for t in (textures.motion, textures.depth))
             return motion, depth[..., 0]
 
     def _once(self, stage: str, number: int, level: int, make: Callable[[int, int], Any]) -> Any:
@@ -144,6 +142,7 @@ class Shot:
         return self._once("pictures", number, 0, self._measured)
 
     def _measured(self, number: int, _: int) -> list[wgpu.GPUTexture] | None:
+        self._passes.submit()  # they may read the picture before, whose place this one takes
         picture = self._load(number)
         if picture is None:
             return None
@@ -316,9 +315,7 @@ class Shot:
         finest = (self._features(number) or [])[:1]
         if not coarsest or not finest:
             return np.zeros((0, 4))
-        encoder = self._passes.device.create_command_encoder()
-        shown = self._passes.images.download(encoder, finest[0])
-        return find_lights(shown, LARGEST * 2**coarsest)
+        return find_lights(self._passes.read(finest[0]), LARGEST * 2**coarsest)
 
     def _polished(
         self, states: wgpu.GPUTexture, size: tuple[int, int], bound: Bindings

@@ -16,7 +16,16 @@ from .device import (
     texel,
     translated,
 )
-from .kernels import BufferPart, FrameBindings, Kernel, Pass, kernel, stored, uniform
+from .kernels import (
+    BufferPart,
+    FrameBindings,
+    Kernel,
+    Pass,
+    SizeBindings,
+    kernel,
+    stored,
+    uniform,
+)
 from .priority import lower_priority, yielding
 from .tape import Tape, Tapes
 
@@ -27,6 +36,7 @@ __all__ = [
     "FrameBindings",
     "Kernel",
     "Pass",
+    "SizeBindings",
     "Tape",
     "Tapes",
     "adapters",

@@ -52,9 +52,29 @@ class FrameBindings:
         return make(device, layout, {index: every[name] for name, index in places.items()})
 
     @classmethod
-    def of_size(cls, device: wgpu.GPUDevice, size: tuple[int, int]) -> FrameBindings:
+    def of_size(
+        cls, device: wgpu.GPUDevice, size: tuple[int, int], groups: BindGroups | None = None
+    ) -> FrameBindings:
         """For passes that need no more of a frame than its size [px]."""
-        return cls(size, {"frame": uniform(device, "common/frame.wgsl", "Frame", size=size)})
+        frame = uniform(device, "common/frame.wgsl", "Frame", size=size)
+        return cls(size, {"frame": frame}, groups=groups)
+
+
+class SizeBindings:
+    """Bindings for passes that need no more of a frame than its size; bind groups are kept.
+
+    The bindings of a size are the same from call to call.
+    """
+
+    def __init__(self, device: wgpu.GPUDevice):
+        self._device, self._groups = device, BindGroups()
+        self._sizes: dict[tuple[int, int], FrameBindings] = {}
+
+    def __call__(self, size: tuple[int, int]) -> FrameBindings:
+        """Bindings of a frame of a size [px]."""
+        if size not in self._sizes:
+            self._sizes[size] = FrameBindings.of_size(self._device, size, self._groups)
+        return self._sizes[size]
 
 
 def uniform(device: wgpu.GPUDevice, file: str, struct: str, **values: Any) -> wgpu.GPUBuffer:

@@ -155,8 +155,9 @@ class Tape(Recorder):
         self._read |= read | {written}
         self._written.add(written)
 
-    def play(self, encoder: wgpu.GPUCommandEncoder, bindings: FrameBindings) -> None:
-        """Record all of it into an encoder, with the group 0 of `bindings`."""
+    def play(self, encoder: wgpu.GPUCommandEncoder, bindings: FrameBindings | None = None) -> None:
+        """Record all of it into an encoder, with the group 0 of `bindings`, by default its own."""
+        bindings = bindings or self._bindings
         groups = [bindings.group(*of_layout) for of_layout in self._frame_groups]
         handles, into, null = [group._internal for group in groups], encoder._internal, ffi.NULL
         for call, arguments in self._first:

@@ -32,12 +32,17 @@ def numpy_of(format: str) -> tuple[np.dtype, int]:
 
 
 def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -> None:
-    """Put an array (height, width[, channels]) into the texture's first corner, as its type."""
+    """Put an array (height, width[, channels]) into the texture's first corner, as its type.
+
+    The last band goes with the next submission.
+    """
     kind, channels = numpy_of(texture.format)
     height, width = image.shape[:2]
     row = width * channels * kind.itemsize
     band = max(1, _BAND // row)
     for top in range(0, height, band):
+        if top:
+            submit(device)  # what is written is held in memory until a submit
         rows = _of_kind(image[top : top + band], kind)
         device.queue.write_texture(
             {"texture": texture, "origin": (0, top, 0)},
@@ -45,7 +50,6 @@ def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -
             {"bytes_per_row": row},
             (width, len(rows), 1),
         )
-        submit(device)  # what is written is held in memory until a submit
 
 
 def _of_kind(rows: np.ndarray, kind: np.dtype) -> np.ndarray:
@@ -89,6 +93,20 @@ class ScratchBuffer:
                 | wgpu.BufferUsage.INDIRECT,
             )
         return self._buffer
+
+
+class KeptViews:
+    """Views of textures of others: of each label, that of the last texture."""
+
+    def __init__(self) -> None:
+        self._views: dict[str, wgpu.GPUTextureView] = {}
+
+    def of(self, texture: wgpu.GPUTexture) -> wgpu.GPUTextureView:
+        """A view of a texture, the same one for as long as no other one has its label."""
+        view = self._views.get(texture.label)
+        if view is None or view.texture is not texture:
+            view = self._views[texture.label] = texture.create_view()
+        return view
 
 
 class TexturePool:

@@ -8,7 +8,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..gpu.textures import ScratchBuffer
+from ..gpu.textures import KeptViews, ScratchBuffer
 
 EIGHT = 8  # pictures that one pass takes
 
@@ -18,6 +18,7 @@ class WeightedSum:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._sums = device, ScratchBuffer(device)
+        self._frame, self._views = gpu.SizeBindings(device), KeptViews()
 
     def encode(
         self,
@@ -33,9 +34,9 @@ class WeightedSum:
         `output`: rgba32float, of that size. `onto`: added to the sum of the call before.
         """
         width, height, _ = output.size
-        bindings = gpu.FrameBindings.of_size(self._device, (width, height))
+        bindings = self._frame((width, height))
         file = "gpu_frame/weighted_sum.wgsl"
-        views = [picture.create_view() for picture in pictures]
+        views = [self._views.of(picture) for picture in pictures]
         for first in range(0, len(views), EIGHT):
             begins = first == 0 and not onto
             shares = np.zeros(EIGHT, np.float32)
@@ -46,6 +47,6 @@ class WeightedSum:
                 bindings,
                 share={"weights": shares.reshape(2, 4)},
                 sums=self._sums.at_least(16 * width * height),
-                output=output.create_view(),
+                output=self._views.of(output),
                 **{f"picture{i}": views[min(first + i, len(views) - 1)] for i in range(EIGHT)},
             )

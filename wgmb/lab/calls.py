@@ -46,7 +46,9 @@ def counted() -> Iterator[Counter[str]]:
 
         return called
 
-    def played(self: Tape, encoder: wgpu.GPUCommandEncoder, bindings: FrameBindings) -> None:
+    def played(
+        self: Tape, encoder: wgpu.GPUCommandEncoder, bindings: FrameBindings | None = None
+    ) -> None:
         counts["dispatches"] += self.dispatches
         counts["passes"] += self.passes
         play(self, encoder, bindings)

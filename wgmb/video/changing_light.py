@@ -9,7 +9,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..gpu.textures import ScratchBuffer, TexturePool
+from ..gpu.textures import KeptViews, ScratchBuffer, TexturePool
 from ..shutter import Shutter
 
 _STEP, _UNTIL = 4, 960  # px along a small pixel, in pictures whose longer side [px] is up to this
@@ -81,6 +81,7 @@ class ChangingLight:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
         self._texel = gpu.texel(device, 4)
+        self._frame, self._views = gpu.SizeBindings(device), KeptViews()
         self._sums = ScratchBuffer(device)
         self._linear = device.create_sampler(mag_filter="linear", min_filter="linear")
         self._small: dict[int, wgpu.GPUTexture] = {}  # the latest last
@@ -116,11 +117,11 @@ class ChangingLight:
         self._near = self._none
         if part == 1:
             before, after = (indices[1] if i is None else i for i in indices[::2])
-            self._near = picture(before).create_view(), picture(after).create_view()
+            self._near = self._views.of(picture(before)), self._views.of(picture(after))
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
+            self._frame(size),
             light={
                 "factors": surroundings.factors,
                 "shares": part * np.array(shares),
@@ -159,7 +160,7 @@ class ChangingLight:
         gpu.kernel(self._device, f"{_FOLDER}/add.wgsl", texels, STEP=changes.step).run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, (light.size[0], light.size[1])),
+            self._frame((light.size[0], light.size[1])),
             picture=light,
             output=output,
             **changes.bindings(),
@@ -179,12 +180,12 @@ class ChangingLight:
         free = {f"small {n}" for n in range(_KEPT)} - {t.label for t in self._small.values()}
         name = min(free) if free else self._small.pop(next(iter(self._small))).label
         size, step = _small_size(light.size), step_of(light.size)
-        made, seen = self._images.texture(name, size, self._texel), light.create_view()
+        made, seen = self._images.texture(name, size, self._texel), self._views.of(light)
         texels = {"picture": gpu.stored(seen), "Output": self._texel}
         gpu.kernel(self._device, f"{_FOLDER}/reduce.wgsl", texels, STEP=step).run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
+            self._frame(size),
             picture=seen,
             output=self._images.view_of(made),
         )

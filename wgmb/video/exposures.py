@@ -15,7 +15,7 @@ from .. import gpu
 from ..color.coding import CodedPicture, Coding
 from ..errors import InputError
 from ..exposure import Cell
-from ..gpu.textures import TexturePool
+from ..gpu.textures import KeptViews, TexturePool
 from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import ExposureSum, Part
@@ -79,6 +79,7 @@ class Exposures:
         self._at_edges = at_edges
         self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
+        self._views = KeptViews()
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self._used: set[str] = set()
         self.shots: ShotReader[Thumbnail] | None = None
@@ -153,7 +154,7 @@ class Exposures:
         for name, step in steps:
             encoder = self.device.create_command_encoder(label=name)
             output = self._images.texture(name, size, "rgba32float")
-            step(encoder, light.create_view(), output.create_view())
+            step(encoder, self._views.of(light), self._views.of(output))
             gpu.submit(self.device, encoder)
             light = output
         return light
@@ -172,7 +173,7 @@ class Exposures:
             return self._average(pictures, [cell.share for cell in cells], coding)
         light, changes = self._blurred(shots, frames, cells, is_coded=True)
         encoder = self.device.create_command_encoder(label="encode")
-        return self._planes.encode(encoder, light.create_view(), coding, changes)
+        return self._planes.encode(encoder, self._views.of(light), coding, changes)
 
     def _blurred(
         self,

@@ -10,7 +10,7 @@ import wgpu
 from .. import gpu
 from ..exposure import Cell, evened
 from ..gpu import wgsl
-from ..gpu.textures import TexturePool
+from ..gpu.textures import KeptViews, TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion import MotionSource
@@ -47,6 +47,7 @@ class VideoFrames:
     ):
         self._shots, self._blur, self._device = shots, blur, blur.device
         self._planes, self._images = planes or Planes(blur.device), TexturePool(blur.device)
+        self._frame_of, self._views = gpu.SizeBindings(blur.device), KeptViews()
         self.changing = changing or ChangingLight(blur.device)
         wants_depth = "depth" in blur.method.needs | blur.method.uses
         self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
@@ -66,7 +67,7 @@ class VideoFrames:
         """
         number = self._shots[index].number
         if self._is_still(index):
-            return FrameInShot(FrameViews(color=self._light(index).create_view()), number=number)
+            return FrameInShot(FrameViews(color=self._light_view(index)), number=number)
         wanted = [index]
         method = (blur or self._blur).method
         takes = method.needs | method.uses
@@ -124,13 +125,13 @@ class VideoFrames:
     def _frame(self, index: int, depth: bool = False) -> FrameViews:
         """The views of one picture. `depth`: whether it is wanted, if it is found only then."""
         of, kept = self._frames.get(index % KEPT, (index, None))
-        light = self._light(index).create_view()
+        light = self._light_view(index)
         if kept is None or of != index or kept.color.texture is not light.texture:
             kept = self._moving(index, light)
         if depth and kept.depth is None and kept.motion is not None and self._source is not None:
             found = self._source.depth(index)
             if found is not None:
-                kept = replace(kept, depth=found.create_view(), key=object())
+                kept = replace(kept, depth=self._views.of(found), key=object())
         self._frames[index % KEPT] = index, kept
         return kept
 
@@ -146,11 +147,11 @@ class VideoFrames:
             self.unfollowed.add(self._shots[index].number)
         (motion, depth), factors = found, self._factors(index)
         if factors != (1.0, 1.0):
-            motion = self._paced(motion, f"motion {index % KEPT}", factors)
+            motion = self._paced(motion, f"paced {index % KEPT}", factors)
         return FrameViews(
             color=light,
-            motion=motion.create_view(),
-            depth=depth and depth.create_view(),
+            motion=self._views.of(motion),
+            depth=depth and self._views.of(depth),
             holdout=self._held_out(index, held),
             key=object(),
         )
@@ -169,6 +170,10 @@ class VideoFrames:
         if not known:
             self._planes.draw(coded, texture)
         return texture
+
+    def _light_view(self, index: int) -> View:
+        """The same as a view."""
+        return self._images.view_of(self._light(index))
 
     def _held_out(self, index: int, plane: np.ndarray | None) -> View | None:
         """View of the mask of the areas of a picture that stay sharp."""
@@ -199,10 +204,10 @@ class VideoFrames:
         gpu.kernel(self._device, file).run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
+            self._frame_of(size),
             pace={"factors": np.repeat(factors, 2)},
-            motion=motion.create_view(),
-            output=output.create_view(),
+            motion=self._views.of(motion),
+            output=self._images.view_of(output),
         )
         gpu.submit(self._device, encoder)
         return output

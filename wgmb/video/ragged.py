@@ -5,7 +5,7 @@ from __future__ import annotations
 import wgpu
 
 from .. import gpu
-from ..gpu.textures import TexturePool
+from ..gpu.textures import KeptViews, TexturePool
 
 KEPT = 3  # motions: of a picture and its neighbours
 _FOLDER = "video/ragged"
@@ -21,6 +21,7 @@ class RaggedMotion:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
+        self._frame, self._views = gpu.SizeBindings(device), KeptViews()
 
     def __call__(
         self,
@@ -33,12 +34,12 @@ class RaggedMotion:
         They are valid until those of `index` + KEPT are asked for.
         """
         size, place = (motion.size[0], motion.size[1]), index % KEPT
-        images, frame = self._images, gpu.FrameBindings.of_size(self._device, size)
+        images, frame = self._images, self._frame(size)
         measured = images.view("measured", size, "rgba32float")
         none = images.view("no depth", (1, 1), "r32float")
         made = images.texture(f"motion {place}", size, "rgba32float")
         made_depth = images.texture(f"depth {place}", (1, 1) if depth is None else size, "r32float")
-        ways = motion.create_view()
+        ways = self._views.of(motion)
         encoder = self._device.create_command_encoder(label="ragged motion")
         measure = gpu.kernel(self._device, f"{_FOLDER}/measure.wgsl")
         measure.run(encoder, "main", frame, motion=ways, output=measured)
@@ -47,7 +48,7 @@ class RaggedMotion:
             "main",
             frame,
             motion=ways,
-            depth=none if depth is None else depth.create_view(),
+            depth=none if depth is None else self._views.of(depth),
             measured=measured,
             motion_out=images.view_of(made),
             depth_out=images.view_of(made_depth),

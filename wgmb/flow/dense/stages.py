@@ -40,17 +40,18 @@ def _at(n: int, side: int, longest: int) -> int:
 class DenseStages:
     """Passes for pictures of one size, with their textures; all are made once.
 
-    Pictures have a place by their number: a picture and its neighbours have three.
+    Pictures have a place by their number: a picture and its neighbours have three. The commands of
+    each place are recorded once, and played for every picture that has it.
     """
 
     def __init__(self, device: wgpu.GPUDevice, size: tuple[int, int]):
         self.device, self.size, self.sizes = device, size, sizes_of(size)
-        self.images, self._groups = TexturePool(device), gpu.BindGroups()
+        self.images, self._frame = TexturePool(device), gpu.SizeBindings(device)
+        self._tapes = gpu.Tapes()
         self._small, self._middle = (
             next(k for k, s in enumerate(self.sizes) if max(s) <= longest or s == self.sizes[-1])
             for longest in (SMALL, HALF)
         )
-        self._frames: dict[tuple[int, int], gpu.FrameBindings] = {}
         self._turns: dict[tuple[int, int, int], wgpu.GPUBuffer] = {}
         self._tables = self._buffer("tables", 4 * _constant("summary", "TABLES", "BINS"))
         self._list, self._groups_of_blocks, self._summary = (
@@ -60,6 +61,13 @@ class DenseStages:
 
     def add(self, encoder: wgpu.GPUCommandEncoder, number: int, picture: wgpu.GPUTextureView):
         """Record the pyramid of a linear picture."""
+
+        def record(tape: gpu.Tape) -> None:
+            self._add(tape, number, picture)
+
+        self._tapes.play(encoder, self._frame(self.size), number % KEPT, (picture,), record)
+
+    def _add(self, encoder: gpu.Tape, number: int, picture: wgpu.GPUTextureView) -> None:
         turn, none = self._turn(number, False, False), self.images.view("none", (1, 1), STATE)
         blank = self._array("blank", (1, 1))
         for level, size in enumerate(self.sizes):
@@ -82,24 +90,37 @@ class DenseStages:
 
         The textures are valid until those of `number` + KEPT are asked for.
         """
-        turn = self._turn(number, has_prev, has_next)
+        turn, place = self._turn(number, has_prev, has_next), number % KEPT
+        motion, order = self.images.texture(f"motion {place}", self.size, STATE), None
+        if depth:
+            order = self.images.texture(f"depth {place}", self.size, "r32float")
+
+        def record(tape: gpu.Tape) -> None:
+            self._find(tape, turn, motion, order)
+
+        self._tapes.play(encoder, self._frame(self.size), (turn.uid, depth), (), record)
+        return motion, order
+
+    def _find(
+        self,
+        encoder: gpu.Tape,
+        turn: wgpu.GPUBuffer,
+        motion: wgpu.GPUTexture,
+        order: wgpu.GPUTexture | None,
+    ) -> None:
         dense = self._dense(encoder, turn)
         begin = self._measured(encoder, turn, dense)
         state = self._searched(encoder, turn, begin)
         middle = self._raised(encoder, turn, state)
-        place = number % KEPT
-        motion = self.images.texture(f"motion {place}", self.size, STATE)
-        self._choose(encoder, turn, dense, middle, self.images.view_of(motion))
-        if not depth:
-            return motion, None
-        order = self.images.texture(f"depth {place}", self.size, "r32float")
-        self._run(
-            encoder, "depth", "main", self.size, turn=turn, motion=self.images.view_of(motion),
-            small=begin, summary=self._summary, output=self.images.view_of(order),
-        )  # fmt: skip
-        return motion, order
+        found = self.images.view_of(motion)
+        self._choose(encoder, turn, dense, middle, found)
+        if order is not None:
+            self._run(
+                encoder, "depth", "main", self.size, turn=turn, motion=found,
+                small=begin, summary=self._summary, output=self.images.view_of(order),
+            )  # fmt: skip
 
-    def _dense(self, encoder: wgpu.GPUCommandEncoder, turn: wgpu.GPUBuffer) -> wgpu.GPUTextureView:
+    def _dense(self, encoder: gpu.Tape, turn: wgpu.GPUBuffer) -> wgpu.GPUTextureView:
         """Motion by dense inverse search, from coarse to fine."""
         images = self.images
         motion = images.view("still", (1, 1), STATE)  # never written, so it is 0
@@ -120,7 +141,7 @@ class DenseStages:
         return motion
 
     def _measured(
-        self, encoder: wgpu.GPUCommandEncoder, turn: wgpu.GPUBuffer, dense: wgpu.GPUTextureView
+        self, encoder: gpu.Tape, turn: wgpu.GPUBuffer, dense: wgpu.GPUTextureView
     ) -> wgpu.GPUTextureView:
         """Motion on the small level; how well it fits, and what most of it is, are kept."""
         size = self.sizes[self._small]
@@ -138,7 +159,7 @@ class DenseStages:
         return begin
 
     def _searched(
-        self, encoder: wgpu.GPUCommandEncoder, turn: wgpu.GPUBuffer, begin: wgpu.GPUTextureView
+        self, encoder: gpu.Tape, turn: wgpu.GPUBuffer, begin: wgpu.GPUTextureView
     ) -> wgpu.GPUTextureView:
         """The state of the small level, with the ways of blocks where they fit better."""
         images, size = self.images, self.sizes[self._small]
@@ -163,7 +184,7 @@ class DenseStages:
         return self._refined(encoder, turn, self._small, state)
 
     def _raised(
-        self, encoder: wgpu.GPUCommandEncoder, turn: wgpu.GPUBuffer, state: wgpu.GPUTextureView
+        self, encoder: gpu.Tape, turn: wgpu.GPUBuffer, state: wgpu.GPUTextureView
     ) -> wgpu.GPUTextureView:
         """The state of the middle level."""
         size = self.sizes[self._middle]
@@ -176,7 +197,7 @@ class DenseStages:
 
     def _refined(
         self,
-        encoder: wgpu.GPUCommandEncoder,
+        encoder: gpu.Tape,
         turn: wgpu.GPUBuffer,
         level: int,
         state: wgpu.GPUTextureView,
@@ -195,7 +216,7 @@ class DenseStages:
 
     def _choose(
         self,
-        encoder: wgpu.GPUCommandEncoder,
+        encoder: gpu.Tape,
         turn: wgpu.GPUBuffer,
         dense: wgpu.GPUTextureView,
         state: wgpu.GPUTextureView,
@@ -218,7 +239,7 @@ class DenseStages:
 
     def _run(
         self,
-        encoder: wgpu.GPUCommandEncoder,
+        encoder: gpu.Tape,
         file: str,
         entry: str,
         size: tuple[int, int],
@@ -232,12 +253,6 @@ class DenseStages:
             many = (n * edge for n, edge in zip(groups, kernel.workgroup, strict=True))
             frame = replace(frame, size=tuple(many))
         kernel.run(encoder, entry, frame, **bound)
-
-    def _frame(self, size: tuple[int, int]) -> gpu.FrameBindings:
-        if size not in self._frames:
-            made = gpu.FrameBindings.of_size(self.device, size)
-            self._frames[size] = replace(made, groups=self._groups)
-        return self._frames[size]
 
     def _turn(self, number: int, has_prev: bool, has_next: bool) -> wgpu.GPUBuffer:
         """The layers of a picture and its neighbours, of which the pyramid's levels have three."""

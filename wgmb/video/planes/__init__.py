@@ -8,7 +8,7 @@ import wgpu
 from ... import gpu
 from ...color.coding import FLOAT, CodedPicture, Coding
 from ...color.highlights import Expansion
-from ...gpu.textures import TexturePool
+from ...gpu.textures import KeptViews, TexturePool
 from ..changing_light import LightChanges
 from .average import Average, averages
 from .matrices import from_samples
@@ -35,6 +35,7 @@ class Planes:
     def __init__(self, device: wgpu.GPUDevice, expansion: Expansion = Expansion()):  # noqa: B008
         self.expansion = expansion
         self.device, self._images, self._packed = device, TexturePool(device), Packed(device)
+        self._frame, self._views = gpu.SizeBindings(device), KeptViews()
         self._none = LightChanges.none(device)
 
     def texel(self, coding: Coding) -> str:
@@ -44,7 +45,7 @@ class Planes:
     def draw(self, picture: CodedPicture, output: wgpu.GPUTexture) -> None:
         """Submit a picture's way into `output`, of its size and a format as for `decode`."""
         encoder = self.device.create_command_encoder(label="decode")
-        self.decode(encoder, picture, output.create_view())
+        self.decode(encoder, picture, self._views.of(output))
         gpu.submit(self.device, encoder)
 
     def decode(
@@ -72,7 +73,7 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self.device, picture.size),
+            self._frame(picture.size),
             code=reading(self.device, coding),
             plane0=views[0],
             plane1=views[1 % len(views)],
@@ -93,7 +94,7 @@ class Planes:
             ALPHA=picture.coding.alpha,
         )
         signals = self._images.upload("signals", picture.planes[0], "rgba32float")
-        frame = gpu.FrameBindings.of_size(self.device, picture.size)
+        frame = self._frame(picture.size)
         kernel.run(encoder, "main", frame, signals=signals, output=output)
 
     def encode(
@@ -127,7 +128,7 @@ class Planes:
             gpu.kernel(self.device, "video/planes/encode.wgsl", texels, **constants).run(
                 encoder,
                 "main",
-                gpu.FrameBindings.of_size(self.device, size),
+                self._frame(size),
                 output=self._images.view_of(samples),
                 **given,
             )
@@ -150,7 +151,7 @@ class Planes:
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self.device, (coarse.words, coarse.size[1])),
+            self._frame((coarse.words, coarse.size[1])),
             planes=data,
             packed=self._packed.buffer(places),
             **given,
@@ -171,5 +172,5 @@ class Planes:
             {"Output": "rgba32float"},
             HIGHLIGHTS=self.expansion.white,
         )
-        frame = gpu.FrameBindings.of_size(self.device, size)
+        frame = self._frame(size)
         kernel.run(encoder, "main", frame, light=light, output=output)

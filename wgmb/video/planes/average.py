@@ -34,6 +34,7 @@ class Average:
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
         self._sums, self._packed = ScratchBuffer(device), Packed(device)
+        self._frame = gpu.SizeBindings(device)
         self._held: list[CodedPicture | None] = [None] * EIGHT
 
     def __call__(
@@ -88,15 +89,13 @@ class Average:
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(
-                self._device, _invocations(grid[0] * grid[1], kernel.workgroup)
-            ),
+            self._frame(_invocations(grid[0] * grid[1], kernel.workgroup)),
             stored=reading(self._device, stored),
             wanted=writing(self._device, wanted),
             average=data,
-            lumas=planes[0].create_view(dimension="2d-array"),
-            blues=planes[1].create_view(dimension="2d-array"),
-            reds=planes[2].create_view(dimension="2d-array"),
+            lumas=self._images.view_of(planes[0], dimension="2d-array"),
+            blues=self._images.view_of(planes[1], dimension="2d-array"),
+            reds=self._images.view_of(planes[2], dimension="2d-array"),
             sums=self._sums.at_least(_SUMS if all(ends) else _SUMS * grid[0] * grid[1]),
             packed=self._packed.buffer(places),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import wgpu
 
+from ... import gpu
 from ...color.coding import FLOAT, Coding
 from ...errors import InputError
 from ...gpu import wgsl
@@ -41,4 +42,4 @@ def _code(device: wgpu.GPUDevice, rows: np.ndarray, alpha: float, coding: Coding
     data = np.zeros((), wgsl.load("video/planes/code.wgsl").dtype("Code"))
     data["x"], data["y"], data["z"] = rows
     data["alpha"], data["step"] = alpha, coding.steps
-    return device.create_buffer_with_data(data=data, usage=wgpu.BufferUsage.UNIFORM)
+    return gpu.constant(device, "code", data)

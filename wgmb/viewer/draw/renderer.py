@@ -400,6 +400,7 @@ class VideoLight:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._images = device, TexturePool(device)
+        self._frame = gpu.SizeBindings(device)
         self._converted: dict[str, tuple[tuple[Any, ...], Image]] = {}
 
     def image(self, slot: str, image: Image, coding: Coding) -> Image:
@@ -436,7 +437,7 @@ class VideoLight:
         kernel.run(
             encoder,
             "main",
-            gpu.FrameBindings.of_size(self._device, size),
+            self._frame(size),
             onto=onto,
             light=light.create_view(),
             output=output.create_view(),

@@ -1,0 +1,72 @@
+"""Calls of wgpu for each picture of a video, as on a GPU: counts are the same on every adapter."""
+
+import numpy as np
+import pytest
+
+import wgmb
+from wgmb import gpu
+from wgmb.flow import Flow, pyramid
+from wgmb.lab.calls import KINDS, counted
+from wgmb.lab.video_bench import flow_settings, synthetic_pictures
+
+SIZE = (96, 64)
+TURN = 6  # pictures after which all rings of textures have had a turn
+NUMBERED = {"groups": 8, "buffers": 2}  # of the frame's number, until it has had all its values
+MOST = {
+    "none": {"passes": 2, "submits": 3, "waits": 1},
+    "auto": {"passes": 22, "submits": 7, "waits": 1} | NUMBERED,
+    "search:fast": {"passes": 31, "submits": 23, "waits": 8, "groups": 60, "buffers": 30,
+                    "views": 3},
+}  # fmt: skip
+"""At most, by flow; of kinds that are not named, none. Submits include wgpu's own of each wait."""
+
+
+def calls(device, flow, count):
+    """The calls of each picture."""
+    pictures = synthetic_pictures(SIZE, count)
+    run = wgmb.blur_pictures(pictures, fps_in=24, shutter=180, device=device,
+                             **flow_settings(flow, device))  # fmt: skip
+    every = []
+    for _ in range(count):
+        with counted() as counts:
+            next(run)
+        every.append(dict(counts))
+    return every
+
+
+@pytest.mark.parametrize(
+    "flow", ["none", "auto", pytest.param("search:fast", marks=pytest.mark.full)]
+)
+def test_a_picture_asks_for_no_more(device, as_with_a_gpu, flow):
+    """Nothing is made once the rings had their turn, but for the numbers of the frames."""
+    for counts in calls(device, flow, TURN + 6)[TURN:-2]:  # the last ones have no neighbours
+        most = dict.fromkeys(KINDS, 0) | MOST[flow]
+        over = {k: n for k, n in counts.items() if k != "dispatches" and n > most[k]}
+        assert not over, counts
+
+
+def searched(device, shown):
+    """Motion and depth by search, and the calls of the last picture."""
+    shot = Flow(quality="fast", device=device).shot(
+        lambda n: shown[n] if 0 <= n < len(shown) else None
+    )
+    with counted():
+        found = [shot(n) for n in range(2, 4)]
+    with counted() as counts:
+        shot.textures(4)
+    return found, counts
+
+
+def test_a_search_is_submitted_where_it_is_read(device, monkeypatch):
+    """The same bits as pass by pass."""
+    monkeypatch.setattr(pyramid, "COARSEST", 24)  # px: several levels in small pictures
+    shown = [(p / 255.0).astype("f4") for p in synthetic_pictures((64, 40), 9)]
+    want, alone = searched(device, shown)
+    monkeypatch.setattr(gpu, "SOFTWARE", "no device")
+    got, together = searched(device, shown)
+    for pair, other in zip(got, want, strict=True):
+        for one, its in zip(pair, other, strict=True):
+            np.testing.assert_array_equal(one, its)
+    assert together["waits"] == alone["waits"] <= 8
+    assert together["submits"] <= 3 * together["waits"] + 2 < alone["submits"] / 2
+    assert together["passes"] <= together["submits"] < together["dispatches"] / 4
