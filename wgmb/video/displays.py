@@ -29,7 +29,6 @@ _NEAR = 8  # px; a digit that changes has what stands within one or two of these
 _LINE = 1, 2  # of these tiles around, along a line of text one further
 _ALIKE = 18  # levels of 255 by which strokes of one display differ
 _MIXED = 0.6  # of the way from a stroke to the ground: up to there a pixel belongs to the stroke
-_GAP = 2
 SHARES = 0.001, 0.15  # of the picture, that a display takes
 
 
