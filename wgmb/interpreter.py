@@ -9,6 +9,7 @@ import sys
 
 TYPE_CHECKING = False  # typing's own is not loaded here
 if TYPE_CHECKING:
+    import signal
     from collections.abc import Callable
 
 _ROOT = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
@@ -69,8 +70,15 @@ def handle_signals(handler: "Callable[..., object] | int") -> None:
     """
     import signal  # by now, it is not searched for in the current folder
 
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows has no SIGHUP
-        is_kept = name == "SIGHUP" and number and signal.getsignal(number) == signal.SIG_IGN
-        if number and not is_kept:
+    for number in ending_signals():
+        is_kept = number.name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN
+        if not is_kept:
             signal.signal(number, handler)
+
+
+def ending_signals() -> "list[signal.Signals]":
+    """The signals that end a program; Windows has no SIGHUP."""
+    import signal
+
+    names = "SIGINT", "SIGTERM", "SIGHUP"
+    return [signal.Signals[name] for name in names if name in signal.Signals.__members__]

@@ -10,6 +10,7 @@ loaded once, by a process that the workers are forked from before anything else 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -76,7 +77,7 @@ def local_client(count: int) -> Iterator[Any]:
         leftovers.add(_end_processes, _end_processes)
         leftovers.add_last(get_temp_dir(), lambda: _remove(get_temp_dir()))
         if method == "forkserver":
-            _load_once()
+            _start_helpers()
         cluster = cluster_of(
             Encryption.temporary(),
             dict(os.environ),  # that of the first process that loaded modules may be older
@@ -108,11 +109,25 @@ def _wait_for(cluster: Any, client: Any, count: int) -> None:
     raise DeviceError(f"{count} workers should answer on this machine; some did not")
 
 
-def _load_once() -> None:
-    """Say what the process loads that workers are forked from; too late if there is one."""
+def _start_helpers() -> None:
+    """Start the process that workers are forked from, unless it runs, and multiprocessing's tracker
+    of semaphores.
+
+    A signal to all processes of a terminal is not for them: it is blocked in both from their first
+    moment. The tracker would otherwise end by SIGHUP, and the one that is started in its place
+    prints tracebacks.
+    """
+    from multiprocessing import forkserver, resource_tracker
+
     from distributed.utils import get_mp_context
 
     get_mp_context().set_forkserver_preload(_LOADED_ONCE)
+    for start in (resource_tracker.ensure_running, forkserver.ensure_running):
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, interpreter.ending_signals())
+        try:
+            start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def kill(cluster: Any, address: str | None = None) -> None:
