@@ -2,6 +2,7 @@
 
 import struct
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -226,3 +227,53 @@ def test_an_attribute_that_is_divided_by_0_is_left_out_and_named(tmp_path, value
         assert part.attributes["owner"] == "me" and "framesPerSecond" not in part.attributes
         assert part.notes == ("attribute framesPerSecond is divided by 0, and left out",)
     np.testing.assert_array_equal(part.channels["R"], channels()["R"])
+
+
+def with_levels(path: Path, channels: dict[str, np.ndarray], mode: OpenEXR.LevelMode) -> Path:
+    """An uncompressed file of tiles with all their levels; those below the largest hold 7."""
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = size = 32
+    tiles.mode = mode
+    planes = dict(sorted(channels.items()))
+    header = {"type": OpenEXR.tiledimage, "tiles": tiles, "compression": OpenEXR.NO_COMPRESSION}
+    OpenEXR.File(header, dict(planes)).write(str(path))
+    height, width = next(iter(planes.values())).shape
+    across, down = ([n >> k for k in range(n.bit_length())] for n in (width, height))
+    places = [(i, j) for j in range(len(down)) for i in range(len(across))]
+    if mode == OpenEXR.MIPMAP_LEVELS:
+        places = [(k, k) for k in range(max(len(across), len(down)))]
+    chunks = []
+    for i, j in places:
+        shape = down[min(j, len(down) - 1)], across[min(i, len(across) - 1)]
+        level = [p if i == j == 0 else np.full(shape, 7, p.dtype) for p in planes.values()]
+        for y in range(0, shape[0], size):
+            for x in range(0, shape[1], size):
+                rows = zip(*(plane[y : y + size, x : x + size] for plane in level), strict=True)
+                data = b"".join(row.tobytes() for planes_row in rows for row in planes_row)
+                head = struct.pack("<5i", x // size, y // size, i, j, len(data))
+                chunks.append(head + data)
+    written = path.read_bytes()
+    lead = written[: _end_of(written)]
+    begin = len(lead) + 8 * len(chunks)
+    starts = np.cumsum([begin, *map(len, chunks[:-1])]).astype("<u8")
+    path.write_bytes(lead + starts.tobytes() + b"".join(chunks))
+    return path
+
+
+def _end_of(data: bytes) -> int:
+    """The first byte behind the header of a one-part file."""
+    at = 8
+    while data[at]:
+        kind = data.index(b"\0", at) + 1
+        size = data.index(b"\0", kind) + 1
+        at = size + 4 + int.from_bytes(data[size : size + 4], "little")
+    return at + 1
+
+
+@pytest.mark.parametrize("mode", [OpenEXR.MIPMAP_LEVELS, OpenEXR.RIPMAP_LEVELS])
+def test_of_tiles_in_several_sizes_the_largest_is_read(tmp_path, mode):
+    channels = make.frame(5, "nuke")
+    file = exr.read(with_levels(tmp_path / "a.exr", channels, mode))
+    for name, plane in channels.items():
+        np.testing.assert_array_equal(file.parts[0].channels[name], plane)
+    assert file.parts[0].notes == ("of tiles in several sizes the largest is used",)

@@ -77,3 +77,10 @@ def test_an_ambiguous_last_part_is_refused():
 def test_two_pictures_without_a_telling_name_are_refused_with_both():
     with pytest.raises(InputError, match=r"`color` chooses one: one, two"):
         layers.find_color([f"{layer}.{c}" for layer in ("one", "two") for c in "RGB"])
+
+
+def test_depth_in_the_layer_of_the_picture_is_found():
+    """As of a part called `beauty`, in which each channel is beauty's."""
+    picture, place = ["beauty.R", "beauty.G", "beauty.B"], ["P.X", "P.Y", "P.Z"]
+    assert layers.find_depth([*picture, "beauty.Z", *place], near="beauty.R") == "beauty.Z"
+    assert layers.find_depth([*picture, *place], near="beauty.R") is None

@@ -91,10 +91,14 @@ def is_right(clip: Clip, most: float, n: int = 5) -> None:
 @pytest.mark.parametrize(
     ("vectors_in", "depth_in", "mask_in"),
     [
-        ("motionvector.####.exr", "depth.####.exr", "matte.####.exr"),
-        ("beauty_motionvector.####.exr", "beauty_Z.####.exr", "beauty_matte.####.exr"),
         ("mv/beauty.####.exr", "Z/beauty.####.exr", "matte/beauty.####.exr"),
         ("s010.Motion Vector_v2.####.exr", "s010.VRayZDepth.####.exr", "s010.matte.####.exr"),
+        pytest.param(
+            "shot_motionvector.####.exr",
+            "shot_Z.####.exr",
+            "shot_matte.####.exr",
+            marks=pytest.mark.full,
+        ),
     ],
 )
 def test_a_layer_a_file_is_called_as_its_file(tmp_path, vectors_in, depth_in, mask_in, capsys):
@@ -368,6 +372,7 @@ def test_vectors_below_a_pixel_of_no_unit_are_told(tmp_path):
     assert "below a pixel" in clip.finding
 
 
+@pytest.mark.full
 def test_objects_alone_that_all_move_one_way_are_around_half_too(tmp_path):
     """Nothing is drawn around them, and no number is near 0.5."""
     for n in NUMBERS:

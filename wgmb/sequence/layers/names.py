@@ -190,6 +190,9 @@ def find_depth(
         return one_channel(by_layer, wanted, "depth layer")
     if "Z" in by_layer.get("", ()):
         return "Z"
+    picture = by_layer.get((near or "").rpartition(".")[0], [])
+    if rgb(picture) and (beside := [m for m in picture if component(m) == "z"]):
+        return beside[0]
     kinds = {
         k: found for k in by_layer if (found := ending(k, _DEPTH)) and not is_of_space(k, found)
     }
