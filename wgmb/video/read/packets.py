@@ -11,6 +11,7 @@ import numpy as np
 from av.packet import Packet
 
 from ...io import limits
+from .fields import SecondFields
 
 
 def justified(packets: Iterable[Packet[Any]], path: Path) -> Iterator[Packet[Any]]:
@@ -23,16 +24,19 @@ def justified(packets: Iterable[Packet[Any]], path: Path) -> Iterator[Packet[Any
 
 
 class PictureTimes:
-    """Times in the packets of a stream of pictures [ticks of the stream's clock]."""
+    """Times in the packets of a stream of pictures [ticks of the stream's clock].
 
-    def __init__(self, codec: str):
+    `header`: the codec's own data.
+    """
+
+    def __init__(self, codec: str, header: bytes = b""):
         self.presented, self.decoded, self.keys = array("q"), array("q"), array("q")
         self.count = self.read = 0  # of pictures that are shown, of packets
         self.untimed = array("q")
         """Numbers, in the order of decoding, of pictures whose time is not stated."""
         self.ascends = True  # the time at which each is shown
         self.is_encrypted = False
-        self._hides = _HIDES.get(codec)
+        self._hides = SecondFields(header) if codec == "h264" else _HIDES.get(codec)
         self._durations = array("q")
         self._latest = self._last_shown = self._last_decoded = 0
 

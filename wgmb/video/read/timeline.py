@@ -214,7 +214,8 @@ def scanned(container: InputContainer, stream: VideoStream, path: Path) -> Timel
     InputError for more packets than a file of its size has.
     """
     base = stream.time_base or Fraction(1, 90000)
-    found = PictureTimes(stream.codec_context.name)
+    context = stream.codec_context
+    found = PictureTimes(context.name, context.extradata or b"")
     wanted = [s for s in container.streams if not s.disposition & Disposition.attached_pic]
     ends: dict[int, int] = {}
     begins: dict[int, int] = {}
