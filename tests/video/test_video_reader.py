@@ -1,5 +1,6 @@
 """Videos are read as they are: every sample, what colours mean, which way is up."""
 
+import re
 from fractions import Fraction
 
 import av
@@ -185,6 +186,24 @@ def test_the_display_that_an_hdr10_video_was_graded_on_is_read(tmp_path):
     assert said["light"] == (
         "brightest pixel 1000, brightest mean of a picture 400 cd/m2 (MaxCLL, MaxFALL)"
     )
+
+
+CAPTIONS = b"\xb5\0\x31GA94\3\x42\xff\xfc\x94\x2c\xfc\x94\x2c\xff"  # of ATSC A/53, part 4
+SHAPE = b"\xb5\0\x31DTG1\x41\xfa"  # of ETSI TS 101 154, annex B
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [(CAPTIONS, "closed captions in its pictures (CEA-608, CEA-708) are not kept"),
+     (SHAPE, "its active format description (AFD) is not kept")],
+)  # fmt: skip
+def test_data_in_pictures_that_is_lost_is_said(tmp_path, data, said):
+    path = clips.write(tmp_path / "a.h264", kind="h264")
+    assert said not in VideoReader(path).notes
+    message = b"\0\0\1\x06\x04" + bytes([len(data)]) + data + b"\x80"
+    slices = re.compile(rb"\x00\x00\x01[\x01\x21\x25\x41\x61\x65]")
+    path.write_bytes(slices.sub(lambda match: message + match[0], path.read_bytes()))
+    assert said in VideoReader(path).notes
 
 
 def test_a_codec_has_its_own_name_not_that_of_a_decoder(tmp_path):

@@ -49,6 +49,16 @@ _OF_FILM = Fraction(30_000, 1001)  # frames a second of television to which film
 _PACE = 1 << 20  # bytes of a file whose packets are listed in a second of the processor, at least
 _OF_FIELDS = (2, 3, 4, 5)  # field orders: two fields a frame
 
+_NOT_KEPT = {
+    Type.DYNAMIC_HDR_PLUS: "HDR10+ data is",
+    Type.DYNAMIC_HDR_VIVID: "HDR Vivid data is",
+    Type.A53_CC: "closed captions in its pictures (CEA-608, CEA-708) are",
+    Type.AFD: "its active format description (AFD) is",
+    Type.S12M_TIMECODE: "time codes in its pictures (SMPTE 12M) are",
+    Type.ICC_PROFILE: "its colour profile (ICC) is not used, and",
+    Type.AMBIENT_VIEWING_ENVIRONMENT: "its ambient viewing environment is",
+}
+
 
 @dataclass(frozen=True)
 class OtherStream:
@@ -222,8 +232,7 @@ class VideoReader:
             )
         elif Type.DOVI_METADATA in side or Type.DOVI_RPU_BUFFER in side:
             self.notes.append("Dolby Vision data is not used: pictures are those of its base layer")
-        if Type.DYNAMIC_HDR_PLUS in side:
-            self.notes.append("HDR10+ data is not kept")
+        self.notes += [f"{text} not kept" for kind, text in _NOT_KEPT.items() if kind in side]
         if self._turn.odd:
             self.notes.append("is turned by other than a multiple of 90 degrees, which is left out")
         if self._packets.lacks:
