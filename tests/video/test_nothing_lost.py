@@ -1,10 +1,15 @@
 """Videos that lose something say so, and an input is never written over."""
 
+import av
+import numpy as np
 import pytest
 
 import make_clips as clips
 import make_frames as make
 from wgmb.cli import app
+from wgmb.run.video import VideoRequest
+from wgmb.settings import OutputSettings
+from wgmb.settings.video import VideoSettings
 from wgmb.video.read.reader import VideoReader
 
 PLAIN = "--flow", "none", "-q"
@@ -60,6 +65,45 @@ def test_a_time_as_colour_space_names_the_option_that_is_meant(tmp_path, capsys)
     text = run(capsys, source, "-o", tmp_path / "b.mkv", "--from", "0:05", code=2)
     assert "--begin" in text and text.count("\n") == 1
     assert make.names_in(tmp_path) == ["a.mkv"]
+
+
+def rich(path):
+    """A video with sound, subtitles, chapters, a text and a time code, of which most are lost."""
+
+    def before(out):
+        out.add_mux_stream("subrip").metadata["language"] = "fra"
+        out.metadata.update({"title": "T", "custom": "mine", "timecode": "01:00:00:00"})
+        part = {"id": 1, "start": 0, "end": 400, "time_base": clips.Fraction(1, 1000)}
+        out.set_chapters([part | {"metadata": {"title": "one"}}])
+
+    def also(out):
+        (text,) = (s for s in out.streams if s.type == "subtitle")
+        packet = av.Packet(b"Hello")
+        packet.stream, packet.time_base = text, clips.Fraction(1, 1000)
+        packet.pts, packet.dts, packet.duration = 0, 0, 300
+        out.mux(packet)
+
+    wave = np.zeros(24000)
+    return clips.write(path, before=before, also=also, sound=("pcm_s16le", 48000, wave))
+
+
+@pytest.mark.parametrize(
+    ("to", "lost"),
+    [("b.mp4", ["text CUSTOM is", "subtitles"]), ("b.mov", ["subtitles"]), ("b.mkv", []),
+     ("b.webm", ["sound", "subtitles", "time code"]),
+     ("b.gif", ["texts title, CUSTOM are", "sound", "subtitles", "time code", "chapter"]),
+     ("b.####.png", ["sound, subtitles, chapters are"]),
+     ("b.####.exr", ["sound, subtitles, chapters are"])],
+)  # fmt: skip
+@pytest.mark.parametrize("speed", [1, 0.5])
+def test_every_loss_is_said_before_the_first_picture(tmp_path, to, lost, speed, device):
+    run = VideoRequest(video=VideoSettings(flow="none", speed=speed)).open(device)
+    plan = run.plan(rich(tmp_path / "a.mkv"), OutputSettings(output=str(tmp_path / to)))
+    said = plan.losses
+    assert make.names_in(tmp_path) == ["a.mkv"]
+    assert set(said) == set(run(plan).left_out)
+    text = "; ".join(said)
+    assert all(word in text for word in lost) and (speed != 1 or bool(lost) == bool(said)), text
 
 
 @pytest.mark.parametrize("is_ordered", [True, False])

@@ -64,8 +64,8 @@ class VideoPlan:
 
     @property
     def losses(self) -> list[str]:
-        """Lines about losses of the pictures in the output; they are in the report, too."""
-        return losses(self.reader, self.output, self.video)
+        """Lines about losses in the output; they are in the report, too."""
+        return losses(self.reader, self.output, self.video, self.clock, self.fps)
 
     @property
     def fps(self) -> Fraction:

@@ -6,6 +6,7 @@ import os
 import zlib
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -68,15 +69,41 @@ def sounds_kept(reader: VideoReader, output: OutputSettings, video: VideoSetting
     return sounds_in(reader.path, suffix, is_encoded=video.pace != 1)
 
 
-def losses(reader: VideoReader, output: OutputSettings, video: VideoSettings) -> list[str]:
-    """Lines about losses of the pictures in the output, as far as they are known before the run."""
+def losses(
+    reader: VideoReader, output: OutputSettings, video: VideoSettings, clock: Clock, rate: Fraction
+) -> list[str]:
+    """Lines about losses in the output, known before the run: of its pictures, and of the rest.
+
+    `rate`: frames per second of the output.
+    """
     path = Path(output.output)
     if path.suffix.lower() not in SUFFIXES:
-        return []
+        return _beside_frames(reader, video)
     encoding = chosen(path, video.codec, video.quality, video.encoder)
     coding, lost = encoding.coding(reader.coding)
-    form = VideoFormat(encoding, coding, reader.size, reader.rate, 1 / reader.rate, reader.facts)
-    return [*lost, *form.left_out]
+    form = VideoFormat(encoding, coding, reader.size, rate, 1 / rate, reader.facts)
+    others = _others(reader, video, clock)
+    streams = others.losses(encoding, rate) if others is not None else []
+    return [*lost, *form.left_out, *streams]
+
+
+def _beside_frames(reader: VideoReader, video: VideoSettings) -> list[str]:
+    """That files of frames hold pictures alone."""
+    if video.streams != "all":
+        return []
+    names = {"audio": "sound", "subtitle": "subtitles", "video": "other pictures"}
+    kinds = [names.get(stream.kind, stream.kind) for stream in reader.streams]
+    kinds = list(dict.fromkeys([*kinds, *["chapters"] * bool(reader.chapters)]))
+    if not kinds:
+        return []
+    are = "are" if len(kinds) > 1 or kinds[0].endswith("s") else "is"
+    return [f"{', '.join(kinds)} {are} left out: files of frames hold none"]
+
+
+def _others(reader: VideoReader, video: VideoSettings, clock: Clock) -> OtherStreams | None:
+    if video.streams != "all":
+        return None
+    return OtherStreams(reader.path, reader.index, clock, video.pitch == "keep")
 
 
 def check_output(output: OutputSettings, video: VideoSettings, source: str | Path) -> None:
@@ -147,10 +174,7 @@ def _write_video(
     mode = atomic.mode_of(path.parent, inputs)
     rate, tick = 1 / wanted[0].interval, wanted.tick
     form = VideoFormat(encoding, coding, reader.size, rate, tick, reader.facts)
-    others = None
-    if video.streams == "all":
-        keeps_pitch = video.pitch == "keep"
-        others = OtherStreams(reader.path, reader.index, source.clock, keeps_pitch)
+    others = _others(reader, video, source.clock)
     coded = coded_form(coding)
     if output.resume and encoding.codec != "gif":  # which has one palette after another
         segments = Segments(path, form, wanted.times, made_of, mode)
@@ -201,7 +225,8 @@ def _write_frames(
         left = [
             frame for frame in wanted if not files.done(FIRST + frame.number, frame_record(frame))
         ]
-    remain = list(filter(None, [beyond(output.output, numbers[-1])]))
+    said = _beside_frames(source.reader, video)
+    remain = list(filter(None, [*said, beyond(output.output, numbers[-1])]))
     if not left:
         return ["is already done", *remain]
     channels = 4 if source.reader.coding.alpha else 3

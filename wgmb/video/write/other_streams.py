@@ -24,12 +24,14 @@ from av.packet import Packet
 from av.stream import Discard, Disposition, Stream
 from av.video.stream import VideoStream
 
+from ...errors import counted
 from ..clock import AS_IT_IS, Clock
 from ..read.container import opened
 from ..read.reader import PRIMING
 from ..read.stream_text import stream_texts
 from .audio import SoundAtSpeed, encoder
-from .encoders import CONTAINERS
+from .encoders import CONTAINERS, Encoding
+from .texts import fitting
 from .time_code import moved
 
 if TYPE_CHECKING:
@@ -95,7 +97,8 @@ class OtherStreams:
             said.append(_left_out(unknown, self._kinds))
         chapters = list(_moved(self._container.chapters(), self._clock))
         if chapters and to.format.name == "gif":
-            said.append(f"{len(chapters)} chapters are left out: a GIF holds none")
+            are = "are" if len(chapters) > 1 else "is"
+            said.append(f"{counted(len(chapters), 'chapter')} {are} left out: a GIF holds none")
         elif chapters:
             to.set_chapters(chapters)
         if self._clock.first is not None and self._clock.first > _BEFORE:
@@ -104,6 +107,17 @@ class OtherStreams:
         self._packets = self._container.demux(wanted) if wanted else iter(())
         self._next = self._following()
         return said
+
+    def losses(self, encoding: Encoding, rate: Fraction) -> list[str]:
+        """What a file cannot hold of the streams, chapters and texts; nothing is written."""
+        trial = av.open(io.BytesIO(), "w", format=encoding.container)
+        try:
+            trial.add_stream(encoding.encoder.name, rate=rate)
+            return [*fitting(encoding.suffix, self.metadata)[2], *self.attach(trial)]
+        finally:
+            with contextlib.suppress(FFmpegError, OSError, ValueError):
+                trial.close()
+            self.close()
 
     def _is_of_chapters(self, stream: Stream) -> bool:
         """Return True for the track in which MP4 and MOV keep chapters."""
@@ -333,6 +347,7 @@ _SUFFIXES = {"matroska": ".mkv", "mp4": ".mp4", "mov": ".mov", "webm": ".webm", 
 
 def _named(stream: Stream) -> str:
     kind = {"audio": "sound", "subtitle": "subtitles"}.get(stream.type or "", stream.type)
+    kind = "cover" if _is_cover(stream) else kind
     language = stream.metadata.get("language", "und")
     text = f"stream {stream.index} ({kind}"
     return text + (f", {language})" if language != "und" else ")")

@@ -29,7 +29,7 @@ def fitting(suffix: str, texts: dict[str, str]) -> tuple[dict[str, str], dict[st
     wanted = {
         key: text
         for key, text in texts.items()
-        if key and text and key not in _OF_THE_FILE and not record.is_begun(text)
+        if key and text and key.lower() not in _OF_THE_FILE and not record.is_begun(text)
     }
     options: dict[str, str] = {}
     lost: list[str] = []
