@@ -256,7 +256,7 @@ def _edges(strokes: np.ndarray, grey: np.ndarray) -> np.ndarray:
 
 
 def _enclosed(strokes: np.ndarray) -> np.ndarray:
-    """Strokes, and pixels between those at most two apart: gaps in a digit, and what it encloses.
+    """Strokes, and pixels between those at most two apart: gaps in a digit, and its inside.
 
     (A closing by 3 x 3 pixels.)
     """

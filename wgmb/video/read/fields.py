@@ -20,7 +20,7 @@ _HEAD = 1024  # bytes of a unit that are looked at: more than parameters take
 
 @dataclass(frozen=True)
 class _Parameters:
-    """What a sequence states of its slices."""
+    """Facts about the slices of a sequence."""
 
     has_fields: bool
     frame_bits: int
@@ -159,7 +159,7 @@ def _parameters(unit: bytes) -> _Parameters:
 
 
 def _skip_chroma(bits: _Bits) -> bool:
-    """Read over what the higher profiles add; True if three planes are coded apart."""
+    """Read over the numbers of higher profiles; True if three planes are coded apart."""
     chroma = bits.number()
     has_planes = chroma == 3 and bool(bits.take(1))
     bits.number()

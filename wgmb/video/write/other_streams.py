@@ -109,7 +109,7 @@ class OtherStreams:
         return said
 
     def losses(self, encoding: Encoding, rate: Fraction) -> list[str]:
-        """What a file cannot hold of the streams, chapters and texts; nothing is written."""
+        """Streams, chapters and texts that a file cannot hold, in words; nothing is written."""
         trial = av.open(io.BytesIO(), "w", format=encoding.container)
         try:
             trial.add_stream(encoding.encoder.name, rate=rate)
