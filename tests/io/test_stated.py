@@ -1,10 +1,12 @@
 """Stills that state more than they hold, or unpack to more than their picture, are refused."""
 
+import functools
 import io
 import lzma
 import struct
 import tracemalloc
 import zlib
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -13,7 +15,7 @@ import tifffile
 from PIL import Image, JpegImagePlugin
 
 from wgmb import Clip, InputError
-from wgmb.io import stills
+from wgmb.io import limits, stills
 
 pytestmark = pytest.mark.fast
 
@@ -80,6 +82,9 @@ REFUSED = {
     "lzw.tif": (lambda: tiff(strip=bytes(256), compression=5), "LZW compression needs the package"),
     "webp.tif": (lambda: tiff(strip=bytes(256), compression=50001), "WEBP compression is not read"),
     "scans.jpg": (lambda: scans(101), "has over 100 scans"),
+    "chunks.png": (lambda: png(chunk(b"tEXt", b"") * 66_000), "has over 65,536 chunks"),
+    "segments.jpg": (lambda: scans(1)[:2] + b"\xff\xfe\0\2" * 66_000 + scans(1)[2:],
+                     "has over 65,536 segments"),
 }  # fmt: skip
 
 
@@ -216,3 +221,14 @@ def test_a_picture_whose_motion_would_take_too_much_is_refused_by_its_header(
 def test_a_frame_with_vectors_is_judged_by_its_own_pixels(tmp_path):
     write_flat(tmp_path / "a.0001.exr", "motion")
     assert Clip(str(tmp_path / "a.0001.exr"), max_mb=400).source(1).size == FLAT
+
+
+@pytest.mark.parametrize("size", [(3840, 2160), (5000, 4000), (1021, 4099)])
+def test_the_limit_that_a_refusal_names_suffices_and_no_less(size):
+    law = functools.partial(limits.check_held, Path("a.mp4"), size, limits.GATHERED, 1000)
+    with pytest.raises(InputError, match=r"`max_mb=\d+` allows it$") as refused:
+        law(limits.MAX_MB)
+    enough = int(str(refused.value).rpartition("max_mb=")[2].partition("`")[0])
+    law(enough)
+    with pytest.raises(InputError):
+        law(enough - 1)

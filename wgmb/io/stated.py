@@ -21,11 +21,14 @@ Allow = Callable[[int, int, int], None]
 """Told the width, the height and the bytes of all strips or tiles, 0 if there are none, before any
 pixel is read; raises where they are too large."""
 
+_MOST_PARTS = 1 << 16  # chunks of a PNG, segments of a JPEG; libpng writes chunks of 8 KB
+
 # ---- PNG (Portable Network Graphics Specification, third edition) ----------------------------
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PASSED = {b"PLTE": 768, b"tRNS": 256, b"gAMA": 4, b"cHRM": 32, b"sRGB": 1, b"cICP": 4}
 """Chunks for the decoder, and the most bytes of each; a colour profile is passed as well."""
+_KEPT = {*_PASSED, b"IHDR", b"iCCP", b"IDAT"}
 _PROFILE = 4 << 20  # bytes that a colour profile inflates to, at most
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
 _ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2),
@@ -37,7 +40,7 @@ def png(data: bytes, allow: Allow) -> bytes:
     """A PNG whose pixels are stored without compression, as long as its header says."""
     if data[:8] != _PNG or data[12:16] != b"IHDR" or data[8:12] != b"\0\0\0\r" or len(data) < 33:
         raise ValueError("no PNG header")
-    chunks = list(_chunks(data))
+    chunks = [each for each in _chunks(data) if each[0] in _KEPT]
     width, height = struct.unpack_from(">2I", data, 16)
     allow(width, height, 0)
     pixels = [body for kind, body in chunks if kind == b"IDAT"]
@@ -51,15 +54,17 @@ def png(data: bytes, allow: Allow) -> bytes:
 def _chunks(data: bytes) -> Iterator[tuple[bytes, memoryview]]:
     """Kind and body of each chunk up to IEND, which must be there."""
     view, at = memoryview(data), 8
-    while at + 12 <= len(data):
+    for _ in range(_MOST_PARTS):
+        if at + 12 > len(data):
+            raise ValueError("cut off before its end")
         length, kind = struct.unpack_from(">I4s", data, at)
         if at + 12 + length > len(data):
-            break
+            raise ValueError("cut off before its end")
         yield kind, view[at + 8 : at + 8 + length]
         if kind == b"IEND":
             return
         at += 12 + length
-    raise ValueError("cut off before its end")
+    raise ValueError(f"has over {_MOST_PARTS:,} chunks")
 
 
 def _passed(chunks: list[tuple[bytes, memoryview]]) -> Iterator[tuple[bytes, memoryview]]:
@@ -107,11 +112,13 @@ _LEFT_OUT = {0xFE, *range(0xE1, 0xF0)} - {0xEE}  # comments and applications; EE
 
 def jpeg(data: bytes) -> bytes:
     """A JPEG of at most 100 scans, without comments and metadata."""
-    view, at, kept, scans = memoryview(data), 0, [], 0
+    view, at, kept, scans, segments = memoryview(data), 0, [], 0, 0
     if data[:2] != b"\xff\xd8":
         raise ValueError("no JPEG header")
     while found := _MARKER.search(data, at):
         marker, begin, at = found[1][0], found.start(), found.end()
+        if (segments := segments + 1) > _MOST_PARTS:
+            raise ValueError(f"has over {_MOST_PARTS:,} segments")
         if marker not in _ALONE:
             at += int.from_bytes(data[at : at + 2], "big")
         if marker == _SOS:
