@@ -155,7 +155,7 @@ class OtherStreams:
     def _add(self, stream: Stream, to: OutputContainer) -> str:
         """Add a stream to the new file; returns why it cannot be, or ''."""
         again = isinstance(stream, AudioStream) and self._clock.speed != 1
-        if why := _refusal(stream, to.format.name, again):
+        if why := _refusal(stream, to.format.name, again, self._path):
             return why
         if _is_cover(stream) and to.format.name == "matroska":
             self._attach_cover(stream, to)
@@ -320,18 +320,27 @@ def sounds_in(path: Path, suffix: str, *, is_encoded: bool) -> list[int]:
     kind = CONTAINERS[suffix]
     with opened(path, is_known=True) as container:
         streams = [s for s in container.streams.audio if s.codec_context is not None]
-        return [s.index for s in streams if not _refusal(s, kind, is_encoded)]
+        return [s.index for s in streams if not _refusal(s, kind, is_encoded, path)]
 
 
-def _refusal(stream: Stream, container: str, again: bool) -> str:
-    """Try a file with this stream alone; returns why it cannot be written, or ''."""
+def _refusal(stream: Stream, container: str, again: bool, path: Path) -> str:
+    """Try a file with this stream alone; returns why it cannot be written, or ''.
+
+    `path`: of the stream's file. Of sound that is copied, a packet is tried as well: what its
+    header says may not fit.
+    """
     trial = av.open(io.BytesIO(), "w", format=container)
+    packet = _first_packet(path, stream.index) if stream.type == "audio" and not again else None
     try:
         if again:
-            encoder(cast(AudioStream, stream), trial)
+            made: Stream = encoder(cast(AudioStream, stream), trial)
         else:
-            _describe(_from_template(stream, trial), stream)
+            made = _from_template(stream, trial)
+            _describe(made, stream)
         trial.start_encoding()
+        if packet is not None:
+            packet.stream, packet.pts, packet.dts = made, 0, 0
+            trial.mux_one(packet)
     except (ValueError, UnknownCodecError, FFmpegError, NotImplementedError):
         name = stream.codec_context.name if stream.codec_context is not None else stream.type
         holds = " (.mkv holds it)" if container != "matroska" else ""
@@ -340,6 +349,15 @@ def _refusal(stream: Stream, container: str, again: bool) -> str:
         with contextlib.suppress(FFmpegError, OSError, ValueError):
             trial.close()
     return ""
+
+
+def _first_packet(path: Path, number: int) -> Packet[Any] | None:
+    """The first packet of a stream; None where it has none, or none can be read."""
+    with opened(path, is_known=True) as container:
+        packets = container.demux(container.streams[number])
+        with contextlib.suppress(FFmpegError):
+            return next((packet for packet in packets if packet.size), None)
+    return None
 
 
 _SUFFIXES = {"matroska": ".mkv", "mp4": ".mp4", "mov": ".mov", "webm": ".webm", "gif": ".gif"}
