@@ -9,7 +9,8 @@ parts      all that may draw a frame: every method and variant, scenes, the view
 
 memory, viewing, damage, hostile, stopping, resuming, numbers, devices, disks, names, videos,
 footage, strangers, stated: the rows
-stated/stills: a sound file of each kind, and the numbers that it states
+stated/stills: a sound file of each kind, and the numbers that it states; stated/copies: a changed
+file as another library reads it
 """
 
 import sys

@@ -3,7 +3,12 @@
 Each kind of file has one small sound file, and a generator that makes the number at one place too
 large. `wgmb info` and `wgmb blur` are then run on each, and the blur of some as by default too,
 with searched motion: they end within 10 s of the processor and 1 GB, with one line that names the
-file, or with the picture of the sound file.
+file, or with the right picture.
+
+A picture is right if it is that of the sound file; or the one that the same command makes of a copy
+of the changed file, as another library reads it (`copies`); or if a line on standard error, without
+`-q`, names the file and tells the loss. Anything else is wrong, also where the other library reads
+nothing.
 
 A command is run in a process forked from this one, which has imported wgmb already; so this
 process must have neither threads nor a GPU device (see `apart`).
@@ -13,8 +18,10 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import operator
 import os
 import pkgutil
+import re
 import signal
 import struct
 import sys
@@ -36,6 +43,9 @@ _IDLE = 30.0  # s without a tick of the processor: it waits for something that n
 _TICK = os.sysconf("SC_CLK_TCK")
 _EVERY = 8  # files of which one is blurred as by default too, with its motion searched
 _PLAINER = "--flow none", "--method tap"  # that the other blurs say, to be quicker
+_LOSS = re.compile(
+    "could not be decoded|damaged|cut off|left out|lost|another size|not kept|not read"
+)
 _SKIPPED = ("wgmb.viewer", "wgmb.hosts", "wgmb.lab", "wgmb.__main__")
 
 Mutations = Callable[[bytes], Iterator[tuple[str, bytes]]]
@@ -48,7 +58,9 @@ class StatedKind:
 
     `write`: makes the sound file at a path. `mutations`: of its bytes, the name and the bytes of
     each changed file. `commands`: the words of every command, for the file and for its output.
-    `digest`: of the output's content; only the sound file's digest is right.
+    `digest`: of the output's content. `copy`: writes what another library reads in a file, with
+    all that the commands need beside it, to another path. `same`: whether two digests are of one
+    picture.
     """
 
     suffix: str
@@ -56,8 +68,12 @@ class StatedKind:
     mutations: Mutations
     commands: Commands
     digest: Callable[[Path], str]
-    many: bool = False
-    """A changed file may hold another picture for a right reason, such as a larger window."""
+    copy: Callable[[Path, Path], object]
+    copied: str
+    """The suffix of a copy."""
+    made: str
+    """The suffix of the output."""
+    same: Callable[[str, str], bool] = operator.eq
 
 
 _MODULES = ("stills", "frames", "tables", "videos")  # of this package; each has KINDS
@@ -113,9 +129,25 @@ def measure(
     `digest` is called with `output` in that process, after a command that ended with 0.
     `interrupt`: it gets Ctrl-C after so many seconds of the processor.
     """
+
+    def main() -> int:
+        from wgmb.cli import app
+
+        return app.main([str(word) for word in words])
+
+    return _measured(main, output, digest, interrupt)
+
+
+def _measured(
+    work: Callable[[], int],
+    output: Path | None = None,
+    digest: Callable[[Path], str] | None = None,
+    interrupt: float | None = None,
+) -> Measured:
+    """The same for a function that returns the exit code."""
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as told:
         if (pid := os.fork()) == 0:
-            _command(words, output, digest, said.fileno(), told.fileno())
+            _child(work, output, digest, said.fileno(), told.fileno())
         ended = _watch(pid, interrupt)
         _, status, used = os.wait4(pid, 0)
         said.seek(0)
@@ -130,22 +162,20 @@ def measure(
         )
 
 
-def _command(
-    words: list[Any],
+def _child(
+    work: Callable[[], int],
     output: Path | None,
     digest: Callable[[Path], str] | None,
     said: int,
     told: int,
 ) -> None:
-    """In the child: the command, then the digest of its output; does not return."""
+    """In the child: the work, then the digest of its output; does not return."""
     code = 70
     try:
         nowhere = os.open(os.devnull, os.O_RDWR)
         for descriptor, to in ((nowhere, 0), (nowhere, 1), (said, 2)):
             os.dup2(descriptor, to)
-        from wgmb.cli import app
-
-        code = app.main([str(word) for word in words])
+        code = work()
         if code == 0 and digest is not None and output is not None and output.exists():
             os.write(told, digest(output).encode())
         sys.stderr.flush()
@@ -192,12 +222,9 @@ def _used(pid: int) -> tuple[float, float]:
     return (int(fields[11]) + int(fields[12])) / _TICK, pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def fault(measured: Measured, path: Path, sound: str = "") -> str:
-    """The fault in the end of a command on `path`, "" if there is none.
-
-    `sound`: the digest of the sound file's output; "" where any picture is right.
-    """
-    code, cpu_s, peak_mb, line, digest, ended = measured
+def fault(measured: Measured, path: Path) -> str:
+    """The fault in the end of a command on `path`, apart from its picture; "" if there is none."""
+    code, cpu_s, peak_mb, line, _, ended = measured
     if ended:
         return f"{ended} ({cpu_s:.1f} s, {peak_mb:.0f} MiB)"
     if cpu_s > MOST_SECONDS or peak_mb > MOST_MB:
@@ -205,13 +232,13 @@ def fault(measured: Measured, path: Path, sound: str = "") -> str:
     if "Traceback" in line:
         return f"traceback: {line.splitlines()[-1]}"
     if code == 0:
-        return "another picture" if sound and digest != sound else ""
+        return ""
     if code not in (1, 2):
         return f"exit {code}: {line}"
     first, *more = line.splitlines() or [""]
     if [text for text in more if not text.endswith(" failed")]:  # how many frames
         return f"more than a line: {line}"
-    return "" if path.stem in first else f"does not name the file: {line}"
+    return "" if f"/{path.stem}." in first else f"does not name the file: {line}"
 
 
 # ---- many files -------------------------------------------------------------------------------
@@ -221,6 +248,7 @@ def prepare() -> None:
     """Import all that a command needs, so that a forked process need not."""
     import wgmb
 
+    os.environ.setdefault("XDG_RUNTIME_DIR", os.devnull)  # a driver complains where it is missing
     for module in pkgutil.walk_packages(wgmb.__path__, "wgmb."):
         if not module.name.startswith(_SKIPPED):
             with contextlib.suppress(ImportError):
@@ -250,37 +278,70 @@ def tried(names: list[str], count: int, folder: str) -> dict[str, dict[str, Any]
 
 def _tried(name: str, kind: StatedKind, count: int, folder: Path) -> dict[str, Any]:
     folder.mkdir()
-    path, output = folder / f"{name}{kind.suffix}", folder / f"out{kind.suffix}"
+    path, output = folder / f"{name}{kind.suffix}", folder / f"out{kind.made}"
     _written(kind.write, path)
     data = path.read_bytes()
-    commands = kind.commands(path, output)
+    commands = _commands(kind, path, output)
     found = {"files": 0, "seconds": 0.0, "mb": 0.0, "slowest": "", "largest": "", "wrong": []}
-    commands.append(_by_default(commands[-1]))
     sound = [_of_sound(words, output, kind) for words in commands]
     cases = list(kind.mutations(data))
     count = min(count, len(cases))
     for n, (what, changed) in enumerate(cases[i * len(cases) // count] for i in range(count)):
         path.write_bytes(changed)
         found["files"] += 1
-        chosen = commands if n % _EVERY == 0 else commands[:-1]
-        for words, right in zip(chosen, sound, strict=False):
+        chosen = len(commands) if n % _EVERY == 0 else len(commands) - 1
+        for which, words in enumerate(commands[:chosen]):
             _clear(output)
             measured = measure(words, output, kind.digest)
-            wrong = fault(measured, path, "" if kind.many else right)
+            wrong = fault(measured, path)
             if not wrong and measured.cpu_s > DEAF_SECONDS:
                 _clear(output)
                 again = measure(words, interrupt=measured.cpu_s / 4)
                 wrong = again.ended
-            case = f"{words[0]}{' by default' * (words is commands[-1])}: {what}"
+            wrong = wrong or _wrong_picture(kind, path, output, which, measured, sound[which])
+            case = f"{words[0]}{' by default' * (which == len(commands) - 1)}: {what}"
             if wrong:
                 found["wrong"].append(f"{case}: {wrong}")
-            for key, which, value in (
+            for key, name_of, value in (
                 ("seconds", "slowest", measured.cpu_s),
                 ("mb", "largest", measured.peak_mb),
             ):
                 if value > found[key]:
-                    found[key], found[which] = value, case
+                    found[key], found[name_of] = value, case
     return found
+
+
+def _commands(kind: StatedKind, path: Path, output: Path) -> list[list[Any]]:
+    """All commands on a file; the last one is the last of its kind as by default."""
+    commands = kind.commands(path, output)
+    return [*commands, _by_default(commands[-1])]
+
+
+def _wrong_picture(
+    kind: StatedKind, path: Path, output: Path, which: int, measured: Measured, sound: str
+) -> str:
+    """The fault in the picture of command number `which`, "" where it is right.
+
+    `sound`: the digest of the sound file's output.
+    """
+    if measured.exit or measured.digest == sound or kind.same(measured.digest, sound):
+        return ""
+    copy = path.with_name(f"copy{kind.copied}")
+    for old in path.parent.glob("copy*"):
+        old.unlink()
+    _clear(output)
+    made = _measured(lambda: int(kind.copy(path, copy) is not None))
+    is_read = made.exit == 0 and copy.exists()
+    why = "no other library reads one" if not is_read else "a copy gives another"
+    if is_read:
+        right = measure(_commands(kind, copy, output)[which], output, kind.digest)
+        if right.exit == 0 and kind.same(measured.digest, right.digest):
+            return ""
+    _clear(output)
+    told = measure([word for word in _commands(kind, path, output)[which] if word != "-q"])
+    if any(path.name in line and _LOSS.search(line) for line in told.line.splitlines()):
+        return ""
+    return f"another picture; {why} ({made.line[-100:]}), and no line tells: {told.line[-300:]}"
 
 
 def _by_default(words: list[str]) -> list[str]:

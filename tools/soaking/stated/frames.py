@@ -15,7 +15,7 @@ import make_frames as make
 from raw_exr import write_levels, write_sampled
 from wgmb.io import exr as wgmb_exr
 
-from . import StatedKind, too_large
+from . import StatedKind, copies, too_large
 
 _MANY_PARTS = 0x1000
 Place = tuple[str, int, str]  # name, offset, form
@@ -139,7 +139,7 @@ def _parts(path: Path) -> None:
 
 
 def _kind(write: Callable[[Path], object]) -> StatedKind:
-    return StatedKind(".exr", write, exr, _commands, _pixels, many=True)
+    return StatedKind(".exr", write, exr, _commands, _pixels, copies.exr, ".exr", ".exr")
 
 
 KINDS = {

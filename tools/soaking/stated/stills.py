@@ -16,7 +16,7 @@ import make_frames as make
 from wgmb.color.srgb import to_display
 from wgmb.io import stills
 
-from . import StatedKind, too_large
+from . import Mutations, StatedKind, copies, too_large
 
 _PLAIN = "--method", "tap", "--overwrite", "-q"
 
@@ -24,7 +24,9 @@ _PLAIN = "--method", "tap", "--overwrite", "-q"
 def _of_stills(path: Path, output: Path) -> list[list[Any]]:
     """Commands on a still: alone, and as frame 2 of three, whose motion is found."""
     for number in (1, 3):
-        _still(path.with_name(f"{path.stem}.{number:04}{path.suffix}"), number)
+        other = path.with_name(f"{path.stem}.{number:04}{path.suffix}")
+        if not other.exists():
+            _still(other, number)
     middle = path.with_name(f"{path.stem}.0002{path.suffix}")
     if not middle.exists():
         middle.symlink_to(path.name)
@@ -122,20 +124,34 @@ def tiff(data: bytes) -> Iterator[tuple[str, bytes]]:
             yield f"{name} {value}", changed
 
 
+def _kind(
+    suffix: str, write: Callable[[Path], object], mutations: Mutations, *, is_tiff: bool = False
+) -> StatedKind:
+    one = copies.tiff if is_tiff else copies.pillow
+    copied = ".tif" if is_tiff else ".png"
+    return StatedKind(
+        suffix, write, mutations, _of_stills, _pixels, _with_others(one), copied, suffix
+    )
+
+
+def _with_others(copy: Callable[[Path, Path], object]) -> Callable[[Path, Path], object]:
+    """The same for a still and the frames before and after it."""
+
+    def copies_of(path: Path, to: Path) -> None:
+        for number in ("", ".0001", ".0003"):
+            names = (f"{each.stem}{number}{each.suffix}" for each in (path, to))
+            copy(*(path.with_name(name) for name in names))
+
+    return copies_of
+
+
 KINDS = {
-    "png": StatedKind(".png", _still, png, _of_stills, _pixels),
-    "jpeg": StatedKind(".jpg", _still, jpeg, _of_stills, _pixels, many=True),
-    "jpeg-progressive": StatedKind(".jpg", _progressive, jpeg, _of_stills, _pixels, many=True),
-    "tiff": StatedKind(".tif", _still, tiff, _of_stills, _pixels, many=True),
-    "tiff-big": StatedKind(
-        ".tif", _tiff(bigtiff=True, rowsperstrip=8), tiff, _of_stills, _pixels, many=True
-    ),
-    "tiff-tiled": StatedKind(
-        ".tif",
-        _tiff(tile=(16, 16), compression="zlib", predictor=True),
-        tiff,
-        _of_stills,
-        _pixels,
-        many=True,
+    "png": _kind(".png", _still, png),
+    "jpeg": _kind(".jpg", _still, jpeg),
+    "jpeg-progressive": _kind(".jpg", _progressive, jpeg),
+    "tiff": _kind(".tif", _still, tiff, is_tiff=True),
+    "tiff-big": _kind(".tif", _tiff(bigtiff=True, rowsperstrip=8), tiff, is_tiff=True),
+    "tiff-tiled": _kind(
+        ".tif", _tiff(tile=(16, 16), compression="zlib", predictor=True), tiff, is_tiff=True
     ),
 }

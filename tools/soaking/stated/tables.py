@@ -11,7 +11,7 @@ import make_frames as make
 from make_config import film_config
 from wgmb.io import stills
 
-from . import StatedKind
+from . import StatedKind, copies
 
 _LARGE = 10, 1000, 100_000, 2**31 - 1, 2**32, 2**64
 _HEAD = 400  # bytes in which the sizes are
@@ -56,9 +56,8 @@ def _commands(path: Path, output: Path) -> list[list[Any]]:
     folder = path.with_name("film")
     folder.mkdir(exist_ok=True)
     config.write_text(film_config(folder).read_text().replace("film.cube", path.name))
-    shown = output.with_suffix(".png")
     plain = "--method", "tap", "--overwrite", "-q"
-    return [["blur", frame, "-o", shown, "--ocio", config, *plain]]
+    return [["blur", frame, "-o", output, "--ocio", config, *plain]]
 
 
 def _cube(path: Path) -> None:
@@ -73,7 +72,7 @@ def _text(text: str) -> Callable[[Path], object]:
 
 
 def _kind(suffix: str, write: Callable[[Path], object]) -> StatedKind:
-    return StatedKind(suffix, write, sizes, _commands, _shown, many=True)
+    return StatedKind(suffix, write, sizes, _commands, _shown, copies.table, ".clf", ".png")
 
 
 def _shown(path: Path) -> str:

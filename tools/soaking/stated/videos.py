@@ -7,16 +7,18 @@ or a table; of other kinds, each of the first bytes as a number of 2, 4 and 8 by
 from __future__ import annotations
 
 import hashlib
+import json
 import struct
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import make_clips as clips
-from wgmb.video.read.reader import VideoReader
+import av
 
-from . import Mutations, StatedKind
+import make_clips as clips
+
+from . import Mutations, StatedKind, copies
 
 _MANY = 30_000_000, 80_000_000  # entries: 2 GB and more of an index in memory
 _LARGE = {
@@ -26,6 +28,7 @@ _LARGE = {
     8: (_MANY[1], 2**63 - 1, 2**64 - 1),
 }
 _SIZE = 64, 48
+_ROUNDED = 0.0021  # s, by which times of Matroska files may differ
 _HEAD = 512  # bytes of a kind whose structure is not walked here
 
 
@@ -203,12 +206,31 @@ def riff(data: bytes) -> Iterator[tuple[str, bytes]]:
 
 
 def _commands(path: Path, output: Path) -> list[list[Any]]:
-    made = output.with_suffix(".mkv")  # not every kind is also written
-    return [["info", path], ["blur", path, "-o", made, "--flow", "none", "--overwrite", "-q"]]
+    plain = "--flow", "none", "--overwrite", "--codec", "ffv1", "-q"
+    return [["info", path], ["blur", path, "-o", output, *plain]]
 
 
 def _pictures(path: Path) -> str:
-    return hashlib.sha256(repr(list(VideoReader(path).times)).encode()).hexdigest()
+    """Times and hashes of all pictures of an output, as text."""
+    with av.open(str(path)) as file:
+        frames = list(file.decode(video=0))
+    pixels = [one.to_ndarray(format="rgb48le").tobytes() for one in frames]
+    return json.dumps([
+        [one.time - frames[0].time for one in frames],
+        [hashlib.sha256(each).hexdigest() for each in pixels],
+    ])  # fmt: skip
+
+
+def _same(first: str, second: str) -> bool:
+    """Return True for the same pictures at the same times, which Matroska rounds."""
+    if not first or not second:
+        return first == second
+    (times, pictures), (others, their) = json.loads(first), json.loads(second)
+    return (
+        pictures == their
+        and len(times) == len(others)
+        and all(abs(a - b) <= _ROUNDED for a, b in zip(times, others, strict=True))
+    )
 
 
 def _video(codec: str, pixels: str = "yuv420p", **more: Any) -> Callable[[Path], object]:
@@ -223,8 +245,12 @@ def _video(codec: str, pixels: str = "yuv420p", **more: Any) -> Callable[[Path],
 _FRAGMENTS = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "write_tmcd": "0"}
 
 
-def _kind(suffix: str, write: Callable[[Path], object], mutations: Mutations) -> StatedKind:
-    return StatedKind(suffix, write, mutations, _commands, _pictures, many=True)
+def _kind(
+    suffix: str, write: Callable[[Path], object], mutations: Mutations, copied: str = ".mkv"
+) -> StatedKind:
+    return StatedKind(
+        suffix, write, mutations, _commands, _pictures, copies.video, copied, ".mkv", _same
+    )
 
 
 KINDS = {
@@ -236,7 +262,9 @@ KINDS = {
     "webm": _kind(".webm", _video("libvpx-vp9", options={"cpu-used": "8"}), matroska),
     "avi": _kind(".avi", _video("mpeg4", tick=Fraction(1, 24)), riff),
     "ts": _kind(".ts", _video("mpeg2video", tick=Fraction(1, 24)), everywhere("big", 188 * 4)),
-    "gif": _kind(".gif", _video("gif", "rgb8", tick=Fraction(1, 100)), everywhere("little")),
+    "gif": _kind(
+        ".gif", _video("gif", "rgb8", tick=Fraction(1, 100)), everywhere("little"), ".nut"
+    ),
     "apng": _kind(".apng", _video("apng", "rgb24", tick=Fraction(1, 24)), everywhere("big")),
     "flv": _kind(".flv", _video("flv", tick=Fraction(1, 24)), everywhere("big")),
     "nut": _kind(".nut", _video("ffv1", tick=Fraction(1, 24)), everywhere("big")),

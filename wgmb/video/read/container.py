@@ -21,6 +21,8 @@ from ...io.frame_numbers import readable
 from .boxes import boxes, check_counts
 
 _MOST_PIXELS = 2**31 - 1  # that FFmpeg's option takes
+_MOST_STREAMS = 1000  # that FFmpeg makes of a file; it leaves others out
+_MOST_CODED = 100  # of pictures and sound, of which each may take a megabyte
 _BEGINNING = 1 << 20  # bytes
 _LONGEST = 60.0, 60.0  # seconds that opening, and reading once, may take
 _LISTS = b"ffconcat", b"#EXTM3U", b"v=0", b"<?xml", b"<MPD"  # that name other files
@@ -60,6 +62,7 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
             timeout=_LONGEST,
             metadata_errors="replace",
         )
+        _check_streams(path, container)
         bound_pictures(container, bound)
         for stream in container.streams.video:
             if stream.codec_context is not None:  # else it crops the left in steps of 32 bytes
@@ -71,6 +74,19 @@ def opened(path: Path, max_mb: float = limits.MAX_MB, *, is_known: bool = False)
         return watch.watched(path, work, stored, math.inf if is_known else max_mb)
     except (FFmpegError, OSError, UnicodeError) as error:
         raise InputError(f"{path}: {_what_is_wrong(path, error)}") from None
+
+
+def _check_streams(path: Path, container: InputContainer) -> None:
+    """InputError for a file of too many streams, of which FFmpeg may have left some out."""
+    count = len(container.streams)
+    coded = sum(one.type in ("video", "audio") for one in container.streams)
+    if count < _MOST_STREAMS and coded <= _MOST_CODED:
+        return
+    container.close()
+    raise InputError(
+        f"{path}: has {count} streams, {coded} of them pictures and sound; "
+        f"at most {_MOST_STREAMS - 1} and {_MOST_CODED} are read"
+    )
 
 
 def size_of(path: Path) -> int:
@@ -138,6 +154,8 @@ def _what_is_wrong(path: Path, error: Exception) -> str:
         beginning = file.read(_BEGINNING)
     if beginning.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_LISTS):
         return "is a list of other files, which is not opened; name the video itself"
+    if getattr(error, "errno", 0) == errno.ENOMEM:
+        return f"has over {_MOST_STREAMS} streams, or asks for more memory than there is"
     if getattr(error, "errno", 0) == errno.EINVAL:
         return "is no kind of video that is read"
     text = getattr(error, "strerror", None) or str(error)
