@@ -413,3 +413,20 @@ def test_long_steps_leave_no_stairs():
     frame = frame_of([passing(t) for t in (0, -1, 1)])
     got = wgmb.Blur("gather", samples=16, shutter=360)(frame)
     assert np.sqrt(np.mean((got - truth)[12, 60:180, :3] ** 2)) < 0.01
+
+
+@pytest.mark.parametrize(("speed", "count"), [(5, 2), (31, 8)])
+def test_auto_takes_a_sample_for_two_pixels_of_blur_and_is_as_close_to_the_truth(speed, count):
+    """Each is read at two places of its way, so a streak has no steps."""
+    wide = np.random.default_rng(0).random((48, 160), np.float32)
+    wide = np.mean([np.roll(wide, k, axis=1) for k in range(-2, 3)], axis=0)
+    wide = np.repeat(wide[..., None], 3, axis=2)
+    colors = [wide[:, 32 - speed * n : 128 - speed * n] for n in (-1, 0, 1)]
+    motion = np.full((48, 96, 2), (speed, 0.0), np.float32)
+    depth = np.ones((48, 96), np.float32)
+    prev, here, next = (wgmb.Frame(color, motion, depth=depth) for color in colors)
+    whole = here.between(prev, next)
+    auto, few, many = (wgmb.Blur("gather", samples=n)(whole) for n in ("auto", count, 64))
+    middle = np.s_[4:-4, 34:-34]
+    np.testing.assert_allclose(auto[middle], few[middle], atol=1e-6)
+    assert np.abs(auto - many)[middle].mean() < 0.01

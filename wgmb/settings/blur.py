@@ -71,8 +71,8 @@ class BlurSettings:
     method: str | None = None
     "Blur method; by default gather with depth or searched motion, else tiles."
     samples: int | Literal["auto"] | None = None
-    """Samples per pixel: 16 by default (fusion: 8). auto, the default for videos: as many as the
-    blur is long, at most 64.
+    """Samples per pixel: 16 by default (fusion: 8). auto, the default for videos: by the length of
+    the blur, at most 64.
     """
     jitter: float = 0.0
     "Jitter of the sample times, 0 to 1: trades banding for noise."
