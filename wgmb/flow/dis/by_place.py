@@ -10,7 +10,7 @@ import numpy as np
 
 from .blocks import Reduced, raised, searched
 from .cost import is_better
-from .dominant import with_dominant
+from .dominant import Dominant
 from .inverse_search import Dis, DisShot, Load, Pictures
 
 TILE = 16  # px
@@ -54,7 +54,9 @@ class ByPlace:
         """That of a picture, (height, width) uint8, between its neighbours; one may lack."""
         here = pictures[1]
         assert here is not None
-        motion = with_dominant(pictures, self._quick.motion(pictures))
+        motion = self._quick.motion(pictures)
+        dominant = Dominant(pictures, motion)
+        motion = dominant.put(motion)
         wanted = uneven(motion, UNEVEN)
         found = searched(pictures, motion)
         if found is not None:
@@ -73,7 +75,7 @@ class ByPlace:
                 one = np.where(is_better(part, one, other, MARGIN)[..., None], other, one)
             there = takes[box].astype(bool)
             motion[box][there] = one[there]
-        return with_dominant(pictures, motion)
+        return dominant.put(motion)
 
 
 def uneven(motion: np.ndarray, least: float) -> np.ndarray:
