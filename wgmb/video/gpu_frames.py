@@ -23,7 +23,7 @@ from .ragged import KEPT
 from .thumbnail import Thumbnail, is_same
 
 EDGE = float(wgsl.load("methods/gather/tiles/active_tiles.wgsl").constant("EDGE"))  # px
-LIGHTS = 5  # pictures that are kept as light: a frame, its neighbours, and two that are summed
+LIGHTS = 6  # pictures kept as light: a frame and its neighbours, the next one, and two of a sum
 
 
 class VideoFrames:
@@ -50,7 +50,10 @@ class VideoFrames:
         self._frame_of, self._views = gpu.SizeBindings(blur.device), KeptViews()
         self.changing = changing or ChangingLight(blur.device)
         wants_depth = "depth" in blur.method.needs | blur.method.uses
-        self._source = VideoMotion(motion, shots, blur.device, wants_depth) if motion else None
+        self._source: VideoMotion | None = None
+        if motion is not None:
+            light = None if self._planes.expansion else self._light
+            self._source = VideoMotion(motion, shots, blur.device, wants_depth, light)
         self._holdout = holdout or Holdout(displays=False)
         self._held = self._holdout.of(shots)
         self.alone: set[int] = set()

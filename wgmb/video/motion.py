@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import wgpu
@@ -26,7 +27,9 @@ class VideoMotion(ShotMotion):
     """The motion of pictures in time, by their indices, nowhere ragged.
 
     Flow and DenseInverseSearch take them as textures of `device`, in light that is not expanded,
-    others as grey. Smooth motion, such as that of dense inverse search, is left as it is.
+    others as grey. Smooth motion, such as that of dense inverse search, is left as it is. `light`:
+    the kept light of a picture, if it is not expanded; inverse search, which looks no further than
+    the next picture, takes it from there.
     """
 
     def __init__(
@@ -35,10 +38,15 @@ class VideoMotion(ShotMotion):
         shots: Shots[Thumbnail],
         device: wgpu.GPUDevice,
         depth: bool = True,
+        light: Callable[[int], wgpu.GPUTexture] | None = None,
     ):
         searched = _Searched(shots, device)
-        is_on_gpu = isinstance(source, Flow | DenseInverseSearch)
-        picture = searched.texture if is_on_gpu else searched.grey
+        if light is not None and isinstance(source, DenseInverseSearch):
+            picture = light
+        elif isinstance(source, Flow | DenseInverseSearch):
+            picture = searched.texture
+        else:
+            picture = searched.grey
         super().__init__(source, picture, shots.moves_on, depth)
         self._grey = searched.grey
         self._device, self._images = device, TexturePool(device)

@@ -10,6 +10,7 @@ import wgpu
 
 from ... import gpu
 from ...errors import InputError
+from ...gpu.textures import KeptViews
 from ..shot import checked
 from .stages import KEPT, DenseStages
 
@@ -57,13 +58,7 @@ class _Pictures:
         self.stages = stages
         self.levels: dict[int, tuple[object, int]] = {}  # shot and number, by place
         self.motions: dict[int, tuple[object, int, Textures]] = {}
-        self._view: tuple[wgpu.GPUTexture, wgpu.GPUTextureView] | None = None
-
-    def view(self, picture: wgpu.GPUTexture) -> wgpu.GPUTextureView:
-        """A view of a texture, the same one for as long as the same texture comes."""
-        if self._view is None or self._view[0] is not picture:
-            self._view = picture, picture.create_view()
-        return self._view[1]
+        self.views = KeptViews()
 
 
 class DenseShot:
@@ -148,7 +143,7 @@ class DenseShot:
         self._size = size
         pictures = self._source.pictures(size)
         if is_texture:
-            view = pictures.view(picture)
+            view = pictures.views.of(picture)
         else:
             view = pictures.stages.images.upload("picture", picture, "rgba32float")
         pictures.stages.add(encoder, number, view)
