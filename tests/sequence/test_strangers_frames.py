@@ -404,6 +404,7 @@ ONE_WAY = (
     "ViewLayer.Motion Vectors.R,ViewLayer.Motion Vectors.G",
     "_CameraMotionVectorsTexture.R,_CameraMotionVectorsTexture.G",
     "XVector,YVector", "X Motion,Y Motion", "vector.X,vector.Y",
+    "MotionVectors2D.R,MotionVectors2D.G", "motion2d.x,motion2d.y", "RE_Velocity.R,RE_Velocity.G",
 )  # fmt: skip
 
 
@@ -418,7 +419,8 @@ def test_names_that_programs_give_to_vectors_are_known(tmp_path, names, up):
 @pytest.mark.parametrize(
     "names",
     [("motionFore.x,motionFore.y", "motionBack.x,motionBack.y"),
-     *in_full(("VectorX,VectorY", "BackVectorX,BackVectorY"),
+     *in_full(("mv_fwd.x,mv_fwd.y", "mv_bwd.x,mv_bwd.y"),
+              ("VectorX,VectorY", "BackVectorX,BackVectorY"),
               ("forward.u,forward.v", "backward.u,backward.v"))],
 )  # fmt: skip
 def test_vectors_to_the_previous_frame_may_lead_from_it(tmp_path, names, sign):
@@ -489,7 +491,7 @@ def test_a_vector_pass_in_a_file_of_its_own_is_blenders(tmp_path, numbers):
 
 
 @pytest.mark.parametrize("convention", ["blender", "nuke", "arnold", "plain"])
-@pytest.mark.parametrize("number", [1e4, -1e4, 1e10, 65504.0])
+@pytest.mark.parametrize("number", [1e4, -1e4, -9999.0, 1e10, 65504.0])
 def test_where_there_is_no_vector_nothing_moves(convention, number):
     channels = make.written(convention, *make.motion(5))
     for plane in channels.values():

@@ -84,7 +84,7 @@ CONVENTIONS: dict[str, Convention] = {
             "toprev", "tonext", "velocity", "velocities", "motion", "motionvectors", "mv", "mvs",
             "motionvec", "motionvecs", "motionvect", "vector", "vectors", "vect", "vec",
             "motionfore", "motionback", "backvector", "backwardvector", "forwardvector",
-            "flow", "opticalflow", "forwardflow", "backwardflow",
+            "fwd", "bwd", "flow", "opticalflow", "forwardflow", "backwardflow",
         ),
         (0, 1),
         (0, 1),

@@ -31,9 +31,11 @@ _OF_SPACE = frozenset(
     ("n", "normal", "normals", "p", "pos", "position", "positions", "pref", "world", "tangent",
      "light", "point", "reflection", "refraction")
 )  # fmt: skip
-_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+")  # mv2DToonz: mv, 2, D, Toonz
+_WORD = re.compile(
+    r"2[dD](?![a-z])|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+"
+)  # mv2DToonz: mv, 2, D, Toonz
 _VERSION = re.compile(
-    r"[0-9]+|v|raw|pass|aov|filtered|unfiltered|texture|buffer"
+    r"[0-9]+|2d|v|raw|pass|aov|filtered|unfiltered|texture|buffer"
 )  # words that say nothing of what a layer holds
 
 

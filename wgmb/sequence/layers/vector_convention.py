@@ -73,8 +73,6 @@ class ConventionFinder:
             return self._none_found(self._stored.files.on_disk[0])
         if self._wanted.convention != "auto":
             return self._as_told(first)
-        if first.sure and not first.notable:
-            return first
         found = self._best([first, self._test(_picture, 1)])
         if found.is_failed:  # the light may have changed everywhere
             of_surfaces = [self._test(self._surfaces, which) for which in (0, 1)]

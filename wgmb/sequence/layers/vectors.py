@@ -28,7 +28,15 @@ from .names import (
     stem,
 )
 
-_BACKWARD = ("backward", "toprev", "motionback", "backvector", "backwardvector", "backwardflow")
+_BACKWARD = (
+    "backward",
+    "toprev",
+    "motionback",
+    "backvector",
+    "backwardvector",
+    "backwardflow",
+    "bwd",
+)
 _DOWN = ("toprev", "tonext")  # layers whose y points down, as wgmb and flow files write them
 _PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?[xyuvXYUV]")
 _PAIR_BEHIND = re.compile(r"(?:(?P<layer>.+)\.)?[xyuvXYUV][ _-]?(?P<stem>[A-Z][A-Za-z_ -]+)")
@@ -37,9 +45,9 @@ _STEP = 1 / 255  # of 8 bits, by which 0.5 may be off
 _MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
 _NEARLY = 0.9  # of the numbers
 _WIDE = 0.25  # from the middle: where the median of numbers lies that are stored around it
-NOWHERE = 1e4
+NOWHERE = 9999.0
 """Numbers from here on, either way, stand for no vector: Blender writes 10000 where nothing was
-rendered, .flo files 1e9 where the flow is unknown."""
+rendered, others -9999, .flo files 1e9 where the flow is unknown."""
 _NUMBERS = STEMS | {stem for stems in TRIPLES.values() for stem in stems} | {"p", "position", "uv"}
 _VALID = ("mv_alpha", "mvalpha")  # layers or channels, after RE:Vision Effects' MV_Alpha
 _FULL = 0.999  # of the mask: vectors are valid
