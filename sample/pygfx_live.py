@@ -15,7 +15,9 @@ from wgmb.hosts.pygfx import MotionBlurPass
 
 def main(method: str = "tiles", frames: int | None = None) -> np.ndarray | None:
     """Open the window, or draw so many `frames` offscreen and return the last picture."""
-    canvas = RenderCanvas(size=(960, 540), title=f"wgmb: {method}", update_mode="continuous")
+    canvas = RenderCanvas(
+        size=(960, 540), title=f"wgmb: {method}", update_mode="continuous", max_fps=60
+    )
     renderer = pygfx.WgpuRenderer(canvas)
     scene, boxes = make_scene()
     camera = pygfx.PerspectiveCamera(50, 16 / 9, depth_range=(0.1, 100))
@@ -25,7 +27,7 @@ def main(method: str = "tiles", frames: int | None = None) -> np.ndarray | None:
 
     def draw() -> None:
         nonlocal time
-        time += 1
+        time += 0.5
         camera.local.position = (np.sin(0.03 * time), 0.5 * np.sin(0.05 * time), 3)
         for i, box in enumerate(boxes):
             box.local.rotation = pylinalg.quat_from_euler((0.07 * i * time / 9, 0.2 * time, 0))
