@@ -184,3 +184,14 @@ def test_deep_samples_that_cannot_be_counted_are_refused(tmp_path, monkeypatch, 
     monkeypatch.setattr(OpenEXR, "File", header_alone)
     with pytest.raises(InputError, match=rf"a\.exr: its deep samples cannot be counted.*{message}"):
         exr.read(path)
+
+
+def test_too_many_tiles_are_refused_by_the_header(tmp_path):
+    """Tiles of a pixel each take the library seconds in which it hears no Ctrl-C."""
+    path = tmp_path / "tiles.exr"
+    tiles = OpenEXR.TileDescription()
+    tiles.xSize = tiles.ySize = 1
+    plane = np.zeros((257, 256), np.float16)
+    OpenEXR.File({"type": OpenEXR.tiledimage, "tiles": tiles}, {"Y": plane}).write(str(path))
+    with pytest.raises(InputError, match=r"tiles\.exr: 65,792 tiles; at most 65,536"):
+        exr.read(path, header_only=True)

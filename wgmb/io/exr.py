@@ -123,6 +123,9 @@ def read(
         raise InputError(f"{path}: not a readable EXR file: {_first_line(error)}") from None
     if (count := sum(len(part.channels) for part in promised)) > limits.MOST_CHANNELS:
         raise InputError(f"{path}: {count} channels; at most {limits.MOST_CHANNELS}")
+    tiles = sum(map(_tiles, promised, [part.header for part in header.parts]))
+    if tiles > limits.MOST_TILES:
+        raise InputError(f"{path}: {tiles:,} tiles; at most {limits.MOST_TILES:,}")
     if header_only:
         return Exr(path, promised)
     needed = sum(limits.unpacked(part.size, len(part.channels)) for part in promised)
@@ -150,6 +153,15 @@ def read(
     except MemoryError:
         raise InputError(f"{path}: not enough memory for {needed >> 20} MB of pixels") from None
     return Exr(path, promised)
+
+
+def _tiles(part: Part, header: dict[str, Any]) -> int:
+    """Tiles of a part with this header; 0 if it has none. Each takes the library some time."""
+    tiles = header.get("tiles")
+    if tiles is None:
+        return 0
+    width, height = part.size
+    return -(-width // max(tiles.xSize, 1)) * -(-height // max(tiles.ySize, 1))
 
 
 def _fill(path: Path, part: Part, stored: Any, data_layers: Collection[str]) -> None:

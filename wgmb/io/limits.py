@@ -17,6 +17,7 @@ from ..frame import MOST_SIDE
 
 MOST_PIXELS_A_SIDE = MOST_SIDE
 MOST_CHANNELS = 4096  # of a file
+MOST_TILES = 1 << 16  # of a file: a picture of 16k by 16k in tiles of 64
 MAX_MB = 4096
 """Megabytes that a file may unpack to unless another limit is given."""
 _TIMES = 500  # as much as the file holds: then it is all but empty, or was made to do harm
