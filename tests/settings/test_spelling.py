@@ -209,6 +209,26 @@ def test_a_value_of_another_kind_is_told_in_words(capsys, option, value, says):
 
 
 @pytest.mark.fast
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("info", "info needs PATTERN; `wgmb info --help` tells more"),
+        (
+            "render wheel",
+            "render needs --output (-o) and its value; `wgmb render --help` tells more",
+        ),
+        ("doctor now", "doctor takes no such word: 'now'; `wgmb doctor --help` tells more"),
+        ("blur a.mp4 -o b.mp4 -vv", "-v is given more than once"),
+        ("vectors a.exr -o b.exr", "--as is missing; the vectors can be nuke, rsmb,"),
+    ],
+)
+def test_a_word_too_few_or_too_many_is_told_in_words(capsys, line, says):
+    code, _, err = make.inside(capsys, *line.split())
+    assert (code, err.count("\n")) == (2, 1)
+    assert says in err
+
+
+@pytest.mark.fast
 def test_a_choice_lists_what_there_is_and_what_was_given():
     check_choice("`window`", "keep", ("grow", "keep"))
     with pytest.raises(InputError) as error:

@@ -230,9 +230,14 @@ def _plainly(text: str, words: list[str]) -> str:
 
         if "--output" in text:  # which is missing where another option of the output is given
             return NOT_WITH_JOB
-    if missing := re.fullmatch(r'Command "(.*)" parameter (--?\S+) requires an argument\.', text):
+    if missing := re.fullmatch(r'Command "(.*)" parameter (\S+) requires an argument\.', text):
         option = "--output (-o)" if missing[2] in ("--output", "-o") else missing[2]
-        return f"{missing[1]} needs {option} and its value; `wgmb {missing[1]} --help` tells more"
+        value = " and its value" if option.startswith("-") else ""
+        return f"{missing[1]} needs {option}{value}; `wgmb {missing[1]} --help` tells more"
+    if unused := re.fullmatch(r"Unused Tokens: \['?(.*?)'?(?:, .*)?\]\.", text):
+        return f"{words[0]} takes no such word: {unused[1]!r}; `wgmb {words[0]} --help` tells more"
+    if twice := re.fullmatch(r"Parameter (\S+) specified multiple times\.", text):
+        return f"{twice[1]} is given more than once"
     text = re.sub(r"^Invalid value for \[(\w+)\] from (.+?): ", r"\2: \1: ", text)
     m = re.fullmatch(r'(.*): unable to convert "(.*)" into (.*)\.', text, re.DOTALL)
     if m is None:

@@ -321,7 +321,7 @@ def _of_cuts(cuts: str | None, clip: Clip) -> str:
     known = CutList(cuts or "")
     if known.is_search or not clip.stray_cuts or len(clip.stray_cuts) < len(known.frames(0)):
         return ""
-    return f"`cuts` {cuts}: no cut is searched for, so the frames are one shot; none says the same"
+    return f"`cuts` {cuts}: no cut is searched for, so the frames are one shot, as with `cuts` none"
 
 
 def _of_scale(scale: str) -> str:

@@ -64,7 +64,7 @@ def vectors(
     run_log.begin(log_json, "vectors", output)
     if form is None:
         if not output.lower().endswith(FLO):
-            raise InputError(f"`form` is missing: the form of {output}, {', '.join(FORMS)}")
+            raise InputError(f"`form` is missing; the vectors can be {', '.join(FORMS)}")
         form = "flo"
     found = frames_at(pattern, input, output)
     request = VectorsRequest(
