@@ -140,7 +140,7 @@ def behave(how: str) -> str:
 
 
 def tried(cases: list[str]) -> list:
-    return forked(cases, behave, seconds=1)
+    return forked(cases, behave, seconds=0.5)
 
 
 def test_a_case_that_crashes_or_hangs_costs_only_itself():
@@ -189,6 +189,13 @@ def test_a_command_that_never_ends_is_ended():
     ended = run(["sleep", "60"], seconds=0.2)
     assert ended.late
     assert "still running" in ended.wrong(0)
+
+
+def test_a_machine_that_is_busy_makes_no_command_late():
+    """Only a command's own processor time counts, or many times as long by the clock."""
+    assert not run(["sleep", "1"], seconds=0.4).late
+    busy = run([sys.executable, "-c", "while True: pass"], seconds=0.4)
+    assert busy.late and busy.seconds < 60
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from .processes import is_late, processor_time
+
+_LOOK = 0.1  # s
 HUNG, DIED = "hung", "died"
 
 
@@ -25,7 +28,7 @@ def forked(cases: Sequence[Any], case: Callable[[Any], Any], seconds: float = 20
             os.close(reads)
             _go_on(cases[len(found) :], case, writes)
         os.close(writes)
-        hung = _listen(reads, found, seconds)
+        hung = _listen(reads, found, pid, seconds)
         if hung:
             os.kill(pid, signal.SIGKILL)
         os.close(reads)
@@ -50,21 +53,23 @@ def _go_on(cases: Sequence[Any], case: Callable[..., Any], writes: int) -> None:
         os._exit(code)
 
 
-def _listen(reads: int, found: list[Any], seconds: float) -> bool:
-    """Take lines until the pipe is closed; whether none came for `seconds`."""
+def _listen(reads: int, found: list[Any], pid: int, seconds: float) -> bool:
+    """Take lines until the pipe is closed; whether the process is late with the next one."""
     text = b""
-    ends = time.monotonic() + seconds
+    begun, used = time.monotonic(), processor_time(pid)
     while True:
-        ready, _, _ = select.select([reads], [], [], max(0.0, ends - time.monotonic()))
+        ready, _, _ = select.select([reads], [], [], _LOOK)
         if not ready:
-            return True
+            if is_late(pid, seconds, time.monotonic() - begun, used):
+                return True
+            continue
         more = os.read(reads, 1 << 16)
         if not more:
             return False
         *lines, text = (text + more).split(b"\n")
         if lines:
             found += map(json.loads, lines)
-            ends = time.monotonic() + seconds
+            begun, used = time.monotonic(), processor_time(pid)
 
 
 def _signal(number: int) -> str:

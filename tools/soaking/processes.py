@@ -28,6 +28,7 @@ from . import PATHS
 
 WGMB = [sys.executable, "-P", "-m", "wgmb"]
 _LOOK = 0.02  # s
+_WAITING = 8  # times its seconds, for a process that takes no processor time
 _ENDS = "\nsoaking: "  # what a function returned follows, on stdout
 
 
@@ -73,7 +74,7 @@ def run(
     prepare: Callable[[], object] | None = None,
     cwd: Path | None = None,
 ) -> Ended:
-    """Run a program to its end, or kill it after `seconds`.
+    """Run a program to its end, or kill it after `seconds` of the processor; see is_late.
 
     `env` is added to the environment; `prepare` is called in the process before it begins.
     """
@@ -87,30 +88,29 @@ def run(
         preexec_fn=prepare,
         cwd=cwd,
     )
-    killer = threading.Timer(seconds, process.kill)
-    killer.start()
-    peak = _Peak(process.pid)
+    watch = _Watch(process.pid, seconds)
     streams = [stream for stream in (process.stdout, process.stderr) if stream]
     with ThreadPoolExecutor(2) as readers:
         said, complained = readers.map(_all_of, streams)
         _, status = os.waitpid(process.pid, 0)
     took = time.perf_counter() - started
-    killer.cancel()
+    peak = watch.end()
     process.returncode = os.waitstatus_to_exitcode(status)
-    late = process.returncode == -signal.SIGKILL and took >= seconds
-    return Ended(process.returncode, said, complained, took, peak.end(), late)
+    late = process.returncode == -signal.SIGKILL and watch.killed
+    return Ended(process.returncode, said, complained, took, peak, late)
 
 
-class _Peak:
-    """The largest memory of a process, followed while it lives.
+class _Watch:
+    """The largest memory of a process, followed while it lives; it is killed once it is late.
 
     What the system says at its end (`ru_maxrss`) is never less than the memory of the
     process that started it.
     """
 
-    def __init__(self, pid: int):
-        self._status = Path(f"/proc/{pid}/status")
+    def __init__(self, pid: int, seconds: float):
+        self._pid, self._seconds, self.killed = pid, seconds, False
         self._largest = 0.0  # MiB
+        self._begun = time.perf_counter()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._thread.start()
@@ -123,9 +123,34 @@ class _Peak:
     def _follow(self) -> None:
         while not self._ended.wait(_LOOK):
             with contextlib.suppress(OSError):
-                for line in self._status.read_text().splitlines():
+                for line in Path(f"/proc/{self._pid}/status").read_text().splitlines():
                     if line.startswith("VmHWM:"):
                         self._largest = max(self._largest, int(line.split()[1]) / 1024)
+                if not self.killed and self._is_late():
+                    self.killed = True
+                    os.kill(self._pid, signal.SIGKILL)
+
+    def _is_late(self) -> bool:
+        took = time.perf_counter() - self._begun
+        return is_late(self._pid, self._seconds, took)
+
+
+def is_late(pid: int, seconds: float, took: float, used: float = 0.0) -> bool:
+    """True if a process has taken `seconds` both by the clock and of the processor.
+
+    As it may wait for ever, many times as long by the clock is late, too: a machine that is busy
+    with other things makes nothing late before. `took`: by the clock [s]. `used`: processor time
+    that does not count [s].
+    """
+    if took < seconds:
+        return False
+    return took > _WAITING * seconds or processor_time(pid) - used > seconds
+
+
+def processor_time(pid: int) -> float:
+    """Seconds of a process, and of those that it started and that have ended."""
+    words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return sum(map(int, words[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def _all_of(stream: IO[bytes]) -> str:
