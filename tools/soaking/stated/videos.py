@@ -274,6 +274,7 @@ KINDS = {
         ".ivf",
         _video("libvpx", options={"cpu-used": "8"}, tick=Fraction(1, 24)),
         everywhere("little", 64),
+        ".nut",
     ),
     "y4m": _kind(
         ".y4m",
