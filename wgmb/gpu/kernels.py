@@ -140,6 +140,8 @@ class Kernel:
         try:
             self._module = _module(device, source.name, source.text)
         except wgpu.GPUError as error:
+            if "device is lost" in str(error):  # no fault of the shader, see device.translated
+                raise
             raise ShaderError(_located(str(error), source)) from None
         self._names = {b.name for b in self.bindings.values() if b.group > 0}
         self.groups = range(1 + max((b.group for b in self.bindings.values()), default=-1))
