@@ -263,11 +263,14 @@ KINDS = {
     "avi": _kind(".avi", _video("mpeg4", tick=Fraction(1, 24)), riff),
     "ts": _kind(".ts", _video("mpeg2video", tick=Fraction(1, 24)), everywhere("big", 188 * 4)),
     "gif": _kind(
-        ".gif", _video("gif", "rgb8", tick=Fraction(1, 100)), everywhere("little"), ".nut"
+        ".gif",
+        _video("gif", "rgb8", tick=Fraction(1, 100), rate=Fraction(25)),
+        everywhere("little"),
+        ".nut",
     ),
     "apng": _kind(".apng", _video("apng", "rgb24", tick=Fraction(1, 24)), everywhere("big")),
     "flv": _kind(".flv", _video("flv", tick=Fraction(1, 24)), everywhere("big")),
-    "nut": _kind(".nut", _video("ffv1", tick=Fraction(1, 24)), everywhere("big")),
+    "nut": _kind(".nut", _video("mpeg4", tick=Fraction(1, 24)), everywhere("big")),
     "mxf": _kind(".mxf", _video("mpeg2video", tick=Fraction(1, 24)), everywhere("big", 1024)),
     "asf": _kind(".asf", _video("wmv2", tick=Fraction(1, 1000)), everywhere("little", 1024)),
     "ivf": _kind(
