@@ -58,7 +58,9 @@ make_root() {  # make_root SYSTEM ROOT
     esac
     mirror=${MIRROR:-http://deb.debian.org/debian} parts=main
     [ "${1%:*}" = debian ] || { mirror=${MIRROR:-http://archive.ubuntu.com/ubuntu} parts=main,universe; }
-    debootstrap --variant=minbase --include=git,ca-certificates --components=$parts \
+    # It mounts the root's /proc, and a killed debootstrap unmounts nothing; its namespace does.
+    unshare --mount --pid --fork --kill-child --mount-proc \
+        debootstrap --variant=minbase --include=git,ca-certificates --components=$parts \
         $suite "$2" "$mirror" >"$2.log" 2>&1 || { tail -5 "$2.log" >&2; return 1; }
     local file
     for file in /etc/resolv.conf /etc/hosts "${passed[@]#*=}"; do
