@@ -3,6 +3,7 @@
 import subprocess
 
 import pytest
+from PIL import Image
 
 import make_clips as clips
 import make_frames as make
@@ -91,6 +92,7 @@ OF_VIDEOS = {
 }  # fmt: skip
 ENCODED = [(name, OF_VIDEOS[name]) for name in ("--codec", "--quality", "--encoder", "--streams")]
 OF_EXR = [("--layers", "picture"), ("--compression", "piz"), ("--window", "keep")]
+COMPARED = "compare", "--truth", "a.exr", "--inputs", "shot.####.exr", "-o", "o.html"
 REFUSED = [
     *((FRAMES, option, "is for input videos") for option in OF_VIDEOS.items()),
     *((STILLS, option, "needs a video as output") for option in ENCODED),
@@ -111,6 +113,14 @@ REFUSED = [
     (("perceive", "--report", "-o", "o.svg"), ("--frames", "2"), "is for files"),
     (("render", "wheel", "-o", "o.####.png", "--frames", "0-1"), ("--time", "1"),
      "is for a single image"),
+    (("compare", "wheel", "-o", "o.html"), ("--peer", "x=b.exr"), "is not for scenes"),
+    (("compare", "wheel", "-o", "o.html"), ("--frames", "2"), "is not for scenes"),
+    (COMPARED, ("--size", "64x36"), "is not for rendered frames"),
+    (COMPARED, ("--reference", "distributed:4"), "is not for rendered frames"),
+    (("compare", "--experiment", "chen", "-o", "o.html"), ("--shutter", "90"),
+     "is not for experiments"),
+    (("compare", "--experiment", "chen", "-o", "o.html"), ("--methods", "tap"),
+     "is not for experiments"),
 ]  # fmt: skip
 
 
@@ -130,11 +140,31 @@ def test_an_option_without_a_use_is_refused(inputs, capsys):
     assert not list(inputs.glob("o.*"))
 
 
+UNREADABLE = [
+    (("--keep", "away.png"), "away.png: no such file"),
+    (("--keep", "away.txt"), "--holdout of a video must be"),
+    (("--keep", "small.png"), "small.png must be"),
+    (("--cuts", "away.edl"), "away.edl: no such file"),
+    (("--curve", "away.csv"), "away.csv"),
+]
+
+
+@pytest.mark.parametrize("source", [("a.mp4", "-o", "o.mp4"), ("a.mp4", "b.mp4", "-o", "o/")])
+def test_the_file_of_an_option_is_refused_before_anything_is_told(inputs, capsys, source):
+    Image.new("L", (4, 4)).save(inputs / "small.png")
+    clips.write(inputs / "b.mp4")
+    is_alone = source[-1] == "o.mp4"
+    for option, why in UNREADABLE if is_alone else UNREADABLE[:2] + UNREADABLE[3:]:
+        code, _, err = make.inside(capsys, "blur", *source, *option)
+        assert (code, err.count("\n")) == (2, 1) and why in err, (option, err)
+
+
 NAMED = [
     (FRAMES, ("--rolling-duration", "0.5"), "has no effect without --rolling"),
     (FRAMES, ("--flow-quality", "fast"), "motion of their own, so --flow-quality has no effect"),
     (("blur", "plain.####.exr", "-o", "o.####.exr", "--flow", "none", "--shutter", "720"),
      ("--vector-scale", "2"), "no vectors, so --vector-scale has no effect"),
+    (VIDEO, ("--pitch", "follow"), "--pitch has no effect without --speed"),
     (VIDEO, ("--ocio", "FIFO"), "keep their own colours, so --ocio has no effect"),
     (VIDEO, ("--from", "acescg"), "keep their own colours, so --from has no effect"),
     (("info", "a.mp4"), ("--look", "x"), "keep their own colours, so --look has no effect"),

@@ -200,5 +200,5 @@ def test_a_mask_and_what_is_found_stay_sharp_together(clip):
 
 def test_none_stands_alone():
     check_masks(("none",))
-    with pytest.raises(InputError, match="stands alone"):
+    with pytest.raises(InputError, match="cannot be combined with other masks"):
         check_masks(("none", "static"))

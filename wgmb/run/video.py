@@ -28,7 +28,7 @@ from ..shots.reader import Picture
 from ..shutter import Shutter
 from ..video.clock import Clock
 from ..video.exposures import Exposures, VideoBlur
-from ..video.holdouts import NONE, check_masks, files_of, holdout_of
+from ..video.holdouts import NONE, check_masks, check_sizes, files_of, holdout_of
 from ..video.output_times import OutputFrame, OutputFrames
 from ..video.planes import Planes
 from ..video.read.reader import VideoReader
@@ -55,7 +55,7 @@ class VideoPlan:
     rate: str
     """A line about the output's rate where it was chosen for the user, or ''."""
     remark: str = ""
-    """A line about the shutter that a user should know, or ''."""
+    """A line about options without effect and small angles, or ''."""
 
     @property
     def notes(self) -> list[str]:
@@ -92,6 +92,7 @@ class VideoRequest(SettingsGroups):
         check_fits(self.input, self.blur)
         self.video.check()
         check_masks(self.blur.holdout)
+        CutList(self.input.cuts or "").frames(0)  # InputError, before anything is said
         if self.blur.holdout not in ((), (NONE,)) and self.video.flow == "none":
             raise InputError("`holdout` needs motion; `flow` none averages whole pictures")
         opened = device if isinstance(device, wgpu.GPUDevice) else gpu.open_device(device)
@@ -165,10 +166,12 @@ class VideoRun:
         reader = VideoReader(path, max_mb=max_mb)
         stored = reader.path.stat().st_size
         limits.check_held(reader.path, reader.size, self._held, stored, max_mb)
+        check_sizes(self.request.blur.holdout, reader.size)
         clock = video.clock(reader, self.request.input.frames, sounds_kept(reader, output, video))
         fps, said = _rate(reader, output)
         wanted = OutputFrames(reader, clock, fps, video.longest_pause)
-        return VideoPlan(reader, output, video, clock, wanted, said, self.request.shutter.remark)
+        remark = "; ".join(filter(None, (self.request.shutter.remark, video.remark)))
+        return VideoPlan(reader, output, video, clock, wanted, said, remark)
 
     @property
     def _held(self) -> int:

@@ -100,6 +100,13 @@ class VideoSettings(FlowSettings):
             raise InputError(f"`longest_pause` must be above 0 seconds, got {self.longest_pause:g}")
 
     @property
+    def remark(self) -> str:
+        """A line about an option without effect; or ''."""
+        if self.pitch == "keep" or self.pace != 1:
+            return ""
+        return "`pitch` has no effect without `speed`"
+
+    @property
     def pace(self) -> Fraction:
         """The speed, exactly."""
         try:

@@ -11,6 +11,7 @@ import numpy as np
 from ..color.coding import CodedPicture
 from ..color.srgb import srgb
 from ..errors import InputError, counted, size_text
+from ..files import bounded
 from ..io import stills
 from ..shots.reader import Shots
 from .displays import Displays
@@ -76,19 +77,28 @@ def holdout_of(masks: Iterable[str], reader: VideoReader) -> Holdout:
         return Holdout(displays=False)
     whole: np.ndarray | None = None
     for name in names:
-        plane = overlay_of(reader) if name == STATIC else _matte(name)
-        if plane.shape[::-1] != reader.size:
-            expected = "{} x {}".format(*reader.size)
-            raise InputError(f"{name} must be {expected} like the video, got {size_text(plane)}")
+        plane = overlay_of(reader) if name == STATIC else _matte(name, reader.size)
         whole = plane if whole is None else np.maximum(whole, plane)
     is_static = STATIC in names
     return Holdout(whole, displays=is_static or not names, always=is_static)
 
 
 def check_masks(masks: tuple[str, ...]) -> None:
-    """InputError for NONE among others."""
+    """InputError for NONE among others, and for files that are no images or not there."""
     if NONE in masks and len(masks) > 1:
-        raise InputError("`holdout` none stands alone: it holds out nothing")
+        raise InputError("`holdout` none cannot be combined with other masks")
+    for path in files_of(masks):
+        if path.suffix.lower() not in stills.SUFFIXES:
+            known = f"{STATIC}, {NONE}, or an image file {' '.join(stills.SUFFIXES)}"
+            raise InputError(f"`holdout` of a video must be {known}; got {str(path)!r}")
+        if not path.is_file():
+            raise bounded.missing(path)
+
+
+def check_sizes(masks: Iterable[str], size: tuple[int, int]) -> None:
+    """InputError for image files that cannot be read, or are not of the video's size."""
+    for path in files_of(masks):
+        _matte(str(path), size)
 
 
 def files_of(masks: Iterable[str]) -> list[Path]:
@@ -96,11 +106,12 @@ def files_of(masks: Iterable[str]) -> list[Path]:
     return [Path(mask) for mask in masks if mask not in (STATIC, NONE)]
 
 
-def _matte(mask: str) -> np.ndarray:
-    if Path(mask).suffix.lower() not in stills.SUFFIXES:
-        known = f"{STATIC}, {NONE}, or an image file {' '.join(stills.SUFFIXES)}"
-        raise InputError(f"holdout of a video must be {known}; got {mask!r}")
-    return srgb(stills.read(mask)[..., 0])
+def _matte(name: str, size: tuple[int, int]) -> np.ndarray:
+    plane = srgb(stills.read(name)[..., 0])
+    if plane.shape[::-1] != size:
+        expected = "{} x {}".format(*size)
+        raise InputError(f"{name} must be {expected} like the video, got {size_text(plane)}")
+    return plane
 
 
 # ---- static areas of a video whose surroundings change: a head-up display, a logo, borders ----

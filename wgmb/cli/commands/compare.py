@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -28,6 +28,8 @@ from ...methods import METHODS
 from ...metrics import check_flip
 from ...scene.scene import Scene
 from ...settings import ShutterSettings, size_of
+from ...settings.color import option_name
+from ...settings.groups import changed
 from ...shutter import Shutter
 from ..console import Console
 from ..help import MAIN
@@ -87,7 +89,30 @@ class CompareSettings:
         return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
 
 
+@dataclass(frozen=True, kw_only=True)
+class SceneFrameSettings:
+    """The frame of built-in scenes."""
+
+    size: str = "480x270"
+    "Image size for scenes."
+    time: float = 0.0
+    "Time of the scenes in seconds."
+    antialias: int = 3
+    "Antialiasing of the scenes' sharp frames: rays per pixel side."
+
+
 Comparison = Annotated[CompareSettings, Parameter(name="*", group=MAIN)]
+SceneFrames = Annotated[SceneFrameSettings, Parameter(name="*", group=MAIN)]
+
+_OF_FILES = {one.name for one in fields(InputOptions)} | {"peer"}
+_OF_METHODS = {one.name for one in fields(CompareSettings)} - {"rounds", "samples"}
+_OF_SHUTTER = {one.name for one in fields(ShutterOptions)}
+_REFUSED = {
+    "scenes": _OF_FILES,
+    "rendered frames": {"size", "time", "antialias", "reference"},
+    "experiments": {"time", "antialias", *_OF_FILES, *_OF_METHODS, *_OF_SHUTTER},
+}
+"""Options that a kind of comparison does not use."""
 
 
 def compare(
@@ -96,9 +121,7 @@ def compare(
     comparison: Comparison = CompareSettings(),
     shutter: Shutters = ShutterOptions(),
     input: Inputs = InputOptions(),
-    size: str = "480x270",
-    time: float = 0.0,
-    antialias: int = 3,
+    frame: SceneFrames = SceneFrameSettings(),
     truth: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
     inputs: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     peer: tuple[str, ...] = (),
@@ -119,12 +142,6 @@ def compare(
         Built-in scenes, NAME[:PARAMETER=VALUE]...
     output
         Report file, .html; JSON and CSV files are written next to it.
-    size
-        Image size for scenes.
-    time
-        Time of the scenes in seconds.
-    antialias
-        Antialiasing of the scenes' sharp frames: rays per pixel side.
     truth
         Ground truth of the blurred frame: one file, or two rendered with half the samples and
         different seeds, whose mean is the truth and whose difference gives the noise floor.
@@ -148,12 +165,17 @@ def compare(
             raise InputError(f"{file} exists; --overwrite replaces it")
     if (truth is None) != (not inputs) or bool(scene) + bool(inputs) + bool(experiment) != 1:
         raise InputError("pass either scenes, --truth with --inputs, or --experiment")
+    kind = "experiments" if experiment else "scenes" if scene else "rendered frames"
+    given = [name for group in (comparison, shutter, input, frame) for name in changed(group)]
+    for name in [*given, *(["peer"] if peer else [])]:
+        if name in _REFUSED[kind]:
+            raise InputError(f"{option_name(name)} is not for {kind}")
     check_flip()  # before a reference is rendered for minutes
     device = gpu.open_device(adapter)
     tell = Console(quiet).say_running
     lab = Laboratory(device, rounds=comparison.rounds, tell=tell)
     report = Report("", command_line(), machine(device), comparison.samples)
-    wanted, candidates = size_of(size), comparison.candidates()
+    wanted, candidates = size_of(frame.size), comparison.candidates()
     steps, budgets = comparison.steps(), comparison.budgets()
     if experiment:
         check_choice("--experiment", experiment, EXPERIMENTS)
@@ -166,7 +188,7 @@ def compare(
     baselines = {name: Path(file) for name, _, file in (p.partition("=") for p in peer)}
     cases: list[Callable[[], Case]] = []
     for name, made in map(make_scene, scene):
-        scene_frame = SceneFrame(made, time, wanted, antialias=antialias)
+        scene_frame = SceneFrame(made, frame.time, wanted, antialias=frame.antialias)
         for degrees, exposed in comparison.labelled_shutters(shutter, made).items():
             cases.append(partial(scene_case, f"{name}, {degrees}", exposed, reference,
                                  scene_frame, device, tell))  # fmt: skip
