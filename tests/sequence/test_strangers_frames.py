@@ -454,17 +454,17 @@ def test_directions_and_constants_are_no_candidates():
     still = np.full((64, 64), 0.5, np.float32)
     some = still.copy()
     some[20:40, 20:40] = rng.random((20, 20))
-    assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 0 * still}) == ["a"]
-    assert vectors.candidates({"a.R": some, "a.G": still, "a.B": 2 * still}) == []
-    assert vectors.candidates({"P_warp.R": some, "P_warp.G": still}) == ["P_warp"]
-    assert vectors.candidates({"P_w.R": some, "P_w.G": still, "P_w.B": 0 * still}) == []
-    assert vectors.candidates({"a.R": still, "a.G": still}) == []
+    assert list(vectors.candidates({"a.R": some, "a.G": still, "a.B": 0 * still})) == ["a"]
+    assert list(vectors.candidates({"a.R": some, "a.G": still, "a.B": 2 * still})) == []
+    assert list(vectors.candidates({"P_warp.R": some, "P_warp.G": still})) == ["P_warp"]
+    assert list(vectors.candidates({"P_w.R": some, "P_w.G": still, "P_w.B": 0 * still})) == []
+    assert list(vectors.candidates({"a.R": still, "a.G": still})) == []
     small = np.zeros((64, 64), np.float32)
     small[5:11, 5:11] = -3
-    assert vectors.candidates({"a.R": small, "a.G": small}) == ["a"]
+    assert list(vectors.candidates({"a.R": small, "a.G": small})) == ["a"]
     four = {"a.R": small, "a.G": small, "a.B": 0 * small}
-    assert vectors.candidates(four | {"a.A": 0 * small + 1}) == ["a"]
-    assert vectors.candidates(four | {"a.A": small}) == []
+    assert list(vectors.candidates(four | {"a.A": 0 * small + 1})) == ["a"]
+    assert list(vectors.candidates(four | {"a.A": small})) == []
 
 
 def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys):
@@ -473,6 +473,87 @@ def test_a_layer_that_may_hold_vectors_is_named_with_its_option(tmp_path, capsys
     assert code == 0
     assert "warp has negative numbers; --vector-layer warp takes warp" in out
     is_right(Clip(pattern, passes=Passes(vectors=Vectors(layer="warp"))), 0)
+
+
+BARE = {  # numbers of vectors, and the reason to take them
+    "y down": (lambda v: v, "has numbers over 1"),
+    "y up": (lambda v: v * -UP, "has negative numbers"),
+    "around a half": (lambda v: v * UP / 64 + 0.5, "is 0.5 in most places"),
+}
+
+
+@pytest.mark.parametrize("kind", [next(iter(BARE)), *in_full(*list(BARE)[1:])])
+@pytest.mark.parametrize(
+    "names",
+    ["u,v", *in_full("dx,dy", "VX,VY", "mx,my", "Xvel,Yvel", "shift_x,shift_y", "e.dx,e.dy")],
+)
+def test_channels_without_a_layer_are_named_with_their_option(tmp_path, capsys, names, kind):
+    numbers, reason = BARE[kind]
+    small = names.startswith("e.") and {"e.k,e.l": three(to_next(5) * 0)[..., :2]}
+
+    def planes(n):
+        depth_and_id = np.dstack([to_next(n)[..., 0] * 0 - 5, to_next(n)[..., 0] * 0 - 1])
+        return {names: numbers(to_next(n)), "depth,objectId": depth_and_id} | (small or {})
+
+    pattern = of_layers(tmp_path, planes)
+    code, out, _ = make.inside(capsys, "info", pattern)
+    assert code == 0
+    assert f"{names} {reason}; --vector-layer {names} takes {names}" in out
+    clip = Clip(pattern, passes=Passes(vectors=Vectors(layer=names)))
+    is_right(clip, 0.05)
+    line = "blur", pattern, "-o", tmp_path / "o.####.exr", "--frames", "5", "--shutter", "180"
+    code, out, err = make.inside(capsys, *line)
+    assert code == 0
+    assert f"--vector-layer {names} takes {names}" in out + err
+    assert "vector-layer" not in "".join(
+        make.inside(capsys, *line, "--vector-layer", names, "--overwrite")[1:]
+    )
+    told, right = make.plain_read(tmp_path / "o.0005.exr"), tmp_path / "right"
+    right.mkdir()
+    of_layers(right, lambda n: {"to_next.x,to_next.y": to_next(n)} | planes(n))
+    line = "blur", right / "s.####.exr", "-o", right / "o.####.exr", "--frames", "5", *line[6:]
+    assert make.inside(capsys, *line)[0] == 0
+    wanted = make.plain_read(right / "o.0005.exr")
+    for c in "RGB":
+        np.testing.assert_allclose(told[c], wanted[c], atol=0.02)
+
+
+@pytest.mark.fast
+def test_parts_of_larger_layers_are_candidates():
+    speed = np.zeros((64, 64), np.float32)
+    speed[5:11, 5:11] = -3
+
+    def found(*names: str) -> list[str]:
+        return list(vectors.candidates(dict.fromkeys(names, speed)))
+
+    assert found("u", "v", "depth", "id", "A", "crypto00") == ["u,v"]
+    assert found("m.r", "m.g", "m.b", "m.dx", "m.dy") == ["m.dx,m.dy"]
+    assert found("fwd_u", "fwd_v", "other", "back_u", "back_v") == ["back_u,back_v", "fwd_u,fwd_v"]
+    assert found("down", "right") == ["down,right"]
+    assert found("one") == []
+    assert found("Px", "Py", "Pz") == []
+    assert found("N_x", "N_y", "N_z") == []
+    assert found("tx", "ty", "tz") == ["tx,ty"]
+    assert found("Z", "depth", "id") == []
+    with_depth = {"X": speed, "Y": speed, "Z": 0 * speed + 9}
+    assert list(vectors.candidates(with_depth)) == ["X,Y"]
+    places = {"u": np.abs(speed) / 4, "v": np.abs(speed) / 4}  # of a texture
+    assert list(vectors.candidates(places)) == []
+
+
+def test_the_alpha_of_a_picture_is_no_mask_of_vectors_beside_it():
+    half = np.full((8, 8), 0.5, "f4")
+    channels = {**dict.fromkeys("RGBA", half), "u": half, "v": half}
+    told = Vectors("rsmb", layer="u,v")
+    assert vectors.mask_of(channels, told) is None
+    assert vectors.mask_of({"u": half, "v": half, "A": half}, told) == "A"
+    assert vectors.mask_of(dict.fromkeys("RGBA", half), Vectors("rsmb", layer="")) == "A"
+
+
+def test_two_channels_that_are_not_there_are_told(tmp_path):
+    clip = Clip(beauty(tmp_path), passes=Passes(vectors=Vectors(layer="dx,dy")))
+    with pytest.raises(InputError, match="no vector layer 'dx,dy'"):
+        clip.frame(clip.source(5))
 
 
 @pytest.mark.parametrize("numbers", [(5,), *in_full(NUMBERS)])

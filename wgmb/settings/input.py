@@ -30,7 +30,7 @@ class InputSettings:
     vectors: str = "auto"
     "Motion vector convention: auto (detected), none, or a name."
     vector_layer: str | None = None
-    "Motion vector layer, if it cannot be found by name."
+    "Motion vector layer, or two channels such as dx,dy, if their names do not tell."
     vector_scale: float | tuple[float, float] = 1.0
     "Factor applied to the motion vectors, or one for x and one for y, such as 1920,1080."
     vector_offset: float | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -144,16 +144,11 @@ class ConventionFinder:
             color = source.color if source.reference_channel else ()
             own = {k: v for k, v in self._stored.own(source).items() if k not in color}
             if perhaps := vectors.candidates(own, source.reference_channel):
-                may = [self._likeness(own, layer, source.reference_channel) for layer in perhaps]
-                text = f"none found by name, but {' and '.join(may)}"
-                text = f"{text}; `vector_layer='{perhaps[0]}'` takes {perhaps[0]}"
+                may = " and ".join(f"{layer} {reason}" for layer, reason in perhaps.items())
+                first = next(iter(perhaps))
+                text = f"none found by name, but {may}; `vector_layer='{first}'` takes {first}"
                 return vector_test.ConventionFinding(None, False, text, notable=True)
         return none
-
-    def _likeness(self, own: Mapping[str, np.ndarray], layer: str, near: str | None) -> str:
-        """The reason to take a layer for vectors, in words."""
-        is_signed = any((own[name] < 0).any() for name in names.layers(own, near)[layer])
-        return f"{layer} {'has negative numbers' if is_signed else 'is 0.5 in most places'}"
 
     def _named(self, number: int) -> tuple[FrameFile, list[vectors.Vectors]]:
         """The vectors that the layers' names speak for, in the first view that has any, as they may

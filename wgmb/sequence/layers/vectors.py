@@ -20,11 +20,13 @@ from .names import (
     MissingLayerError,
     component,
     ending,
+    is_depth,
     is_of_space,
     is_whole,
     layers,
     one_channel,
     pick,
+    rgb,
     stem,
 )
 
@@ -40,6 +42,8 @@ _BACKWARD = (
 _DOWN = ("toprev", "tonext")  # layers whose y points down, as wgmb and flow files write them
 _PAIR = re.compile(r"(?:(?P<layer>.+)\.)?(?P<stem>[A-Za-z_ -]+?)[ _-]?[xyuvXYUV]")
 _PAIR_BEHIND = re.compile(r"(?:(?P<layer>.+)\.)?[xyuvXYUV][ _-]?(?P<stem>[A-Z][A-Za-z_ -]+)")
+_AXES = ("xyz", "XYZ", "uvw", "UVW")  # letters that tell the channels of a vector apart
+_NO_VECTOR = re.compile(r"[RGBAYZrgbaz]|.*([iI]d|ID)|.*[cC]rypto.*")  # channels beside the picture
 _UNIT = 0.02  # from 1: the length of a unit vector, in half floats
 _STEP = 1 / 255  # of 8 bits, by which 0.5 may be off
 _MOSTLY = 0.9  # of the pixels: at edges, unit vectors are mixed with others
@@ -64,10 +68,11 @@ class Vectors:
     """Vectors to read, and their convention.
 
     `convention`: "auto", "none" or a name in CONVENTIONS. `layer`: name of a layer that cannot be
-    found automatically. `offset`, the value that encodes zero motion, is subtracted first, then
-    `scale` multiplies, or one for x and one for y; `flip` reverses "x", "y" or "xy". `mask`: layer
-    that is 1 where the vectors are valid, or "none"; by default one called MV_Alpha, or the alpha
-    of rsmb's vectors. `turned`: those to the previous frame lead from it.
+    found automatically, or of two channels, that for x first: "dx,dy". `offset`, the value that
+    encodes zero motion, is subtracted first, then `scale` multiplies, or one for x and one for y;
+    `flip` reverses "x", "y" or "xy". `mask`: layer that is 1 where the vectors are valid, or
+    "none"; by default one called MV_Alpha, or the alpha of rsmb's vectors. `turned`: those to the
+    previous frame lead from it.
     """
 
     convention: str = "auto"
@@ -136,7 +141,7 @@ def named(
         return None
     if wanted.convention != "auto":
         return wanted
-    by_layer = _layers(names, near)
+    by_layer = _layers(names, near, wanted.layer)
     if wanted.layer is not None:
         only = pick(by_layer, wanted.layer, "vector layer")
         by_layer = {only: by_layer[only]}
@@ -159,29 +164,79 @@ def direction_of(title: str) -> int | None:
     return 1 if ending(title, STEMS) else None
 
 
-def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> list[str]:
-    """Layers that may hold vectors under a name that does not say so.
+def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> dict[str, str]:
+    """Layers that may hold vectors under a name that does not say so, and the reason, in words.
 
-    They have two channels, or three, with negative numbers or 0.5 where nothing moves, are no unit
-    vectors, and those of three are not called as places or directions in space. An alpha that is
-    1 everywhere is no channel of theirs.
+    They have two channels, or three, with numbers of motion. Those of three are not called as
+    places or directions in space. An alpha that is 1 everywhere is no channel of theirs. Of a
+    larger layer, and of the channels without one, parts count, by the name "x,y" of two channels.
     """
-    found = []
+    found: dict[str, str] = {}
     for layer, all_members in layers(channels, near).items():
         is_opaque = component(all_members[-1]) in ("a", "alpha") and np.all(
             channels[all_members[-1]] == 1
         )
         members = all_members[:-1] if is_opaque else all_members
-        if not layer or len(members) not in (2, 3) or (len(members) == 3 and is_of_space(layer)):
-            continue
-        planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
-        with np.errstate(all="ignore"):
-            centred = planes if (planes < 0).any() else _around_half(planes)
-            lengths = np.sqrt((centred**2).sum(axis=0))
-            is_unit = np.abs(lengths[lengths > 0] - 1) < _UNIT
-            if is_unit.size and is_unit.mean() < _MOSTLY:
-                found.append(layer)
+        if layer and len(members) in (2, 3):
+            parts = {} if len(members) == 3 and is_of_space(layer) else {layer: members}
+        else:
+            parts = _parts(members)
+        reasons = {name: _likeness(channels, part) for name, part in parts.items()}
+        found |= {name: reason for name, reason in reasons.items() if reason}
     return found
+
+
+def _parts(members: list[str]) -> dict[str, list[str]]:
+    """Channels of one layer that may be vectors, by the name "x,y" of the first two.
+
+    Their names differ by one letter, x and y or u and v; those with z or w there, too, are not
+    called as places or directions in space. Where no names differ so, they are the two or three
+    channels without a layer that nothing else explains.
+    """
+    layer = members[0].rpartition(".")[0]
+    lead = f"{layer}." if layer else ""
+    own = sorted({name.removeprefix(lead) for name in members} - {"Z"})
+    parts = {stem: part for name in own for stem, part in _called_as_axes(name, own)}
+    rest = [n for n in own if not (_NO_VECTOR.fullmatch(n) or is_depth(n))]
+    if not parts and not layer and len(rest) in (2, 3):
+        parts = {"": rest}
+    kept = [part for stem, part in parts.items() if len(part) == 2 or not is_of_space(stem)]
+    return {f"{lead}{part[0]},{lead}{part[1]}": [lead + name for name in part] for part in kept}
+
+
+def _called_as_axes(name: str, names: list[str]) -> list[tuple[str, list[str]]]:
+    """Of `names` those that are `name` but for an axis, and what they have in common before it and
+    behind it; nothing if `name` is not the first of at least two.
+    """
+    found = []
+    for at, letter in enumerate(name):
+        begin, end = name[:at], name[at + 1 :]
+        axes = next((axes for axes in _AXES if axes[0] == letter), "")
+        part = [begin + axis + end for axis in axes]
+        if axes and part[1] in names:
+            found.append((f"{begin} {end}", [n for n in part if n in names]))
+    return found
+
+
+def _likeness(channels: Mapping[str, np.ndarray], members: list[str]) -> str:
+    """The reason to take channels for vectors, in words; "" if there is none.
+
+    Unit vectors are directions. Numbers over 1 count in two channels that are called as axes, and
+    not as places or directions in space.
+    """
+    planes = np.stack([channels[name][::3, ::3] for name in members]).astype(np.float32)
+    are_axes = len(members) == 2 and _called_as_axes(members[0], members)
+    are_axes = are_axes and not any(map(is_of_space, members[0].split(".")))
+    with np.errstate(all="ignore"):
+        if (planes < 0).any():
+            reason = "has negative numbers"
+        elif are_axes and (planes > 1).any():
+            reason = "has numbers over 1"
+        else:
+            reason, planes = "is 0.5 in most places", _around_half(planes)
+        lengths = np.sqrt((planes**2).sum(axis=0))
+        is_unit = np.abs(lengths[lengths > 0] - 1) < _UNIT
+    return reason if is_unit.size and is_unit.mean() < _MOSTLY else ""
 
 
 def _around_half(planes: np.ndarray) -> np.ndarray:
@@ -204,8 +259,11 @@ def named_as_flow(planes: Mapping[str, np.ndarray], title: str) -> dict[str, np.
     return {f"{title}.{layer}.{name}" if title else name: p for name, p in planes.items()}
 
 
-def _layers(names: Iterable[str], near: str | None) -> dict[str, list[str]]:
-    """Channels by layer; also of layers whose names stand beside X and Y, as in `BackVectorX`."""
+def _layers(names: Iterable[str], near: str | None, wanted: str | None) -> dict[str, list[str]]:
+    """Channels by layer; also of layers whose names stand beside X and Y, as in `BackVectorX`.
+
+    Two channels that are `wanted`, with a comma between them, are a layer of that name.
+    """
     names = list(names)
     found, pairs = layers(names, near), dict[str, list[str]]()
     for name in sorted(names):
@@ -213,7 +271,9 @@ def _layers(names: Iterable[str], near: str | None) -> dict[str, list[str]]:
             if (m := form.fullmatch(name)) and ending(m["stem"], STEMS):
                 pairs.setdefault(".".join(filter(None, (m["layer"], m["stem"]))), []).append(name)
                 break
-    return found | {k: members for k, members in pairs.items() if len(members) == 2}
+    found |= {k: members for k, members in pairs.items() if len(members) == 2}
+    two = (wanted or "").split(",")
+    return found | ({wanted: two} if wanted and len(two) == 2 and set(two) <= set(names) else {})
 
 
 def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str, list[str]]:
@@ -267,7 +327,7 @@ def readings(
     if low < 0 or high > 1:
         return [vectors]
     if list(sides) == ["next"]:
-        layer = _layer_of(channels, sides["next"], near)
+        layer = _layer_of(channels, vectors, sides["next"], near)
         coded = replace(vectors, convention="rsmb", layer=layer)
     else:
         coded = replace(vectors, offset=0.5)
@@ -283,8 +343,8 @@ def _as_blenders(
     """`vectors` as a Vector pass in R, G, B and A, if they are called so and B and A are motion."""
     if vectors.convention != "plain" or list(sides) != ["next"]:
         return None
-    layer = _layer_of(channels, sides["next"], near)
-    members = _layers(channels, near)[layer]
+    layer = _layer_of(channels, vectors, sides["next"], near)
+    members = _layers(channels, near, vectors.layer)[layer]
     is_called_so = ending(layer, CONVENTIONS["blender"].stems) is not None
     if not is_called_so or [component(name) for name in members] != ["r", "g", "b", "a"]:
         return None
@@ -301,8 +361,13 @@ def _are_around(planes: np.ndarray, middle: float) -> bool:
     return bool(is_near.all()) and bool(apart.min() <= 0 <= apart.max())
 
 
-def _layer_of(names: Iterable[str], pair: tuple[str, str], near: str | None) -> str:
-    return next(k for k, members in _layers(names, near).items() if set(pair) <= set(members))
+def _layer_of(
+    names: Iterable[str], vectors: Vectors, pair: tuple[str, str], near: str | None
+) -> str:
+    """The layer, of those that have both channels, that has the fewest others."""
+    by_layer = _layers(names, near, vectors.layer)
+    fitting = [k for k, members in by_layer.items() if set(pair) <= set(members)]
+    return min(fitting, key=lambda k: len(by_layer[k]))
 
 
 def channels_of(
@@ -310,7 +375,7 @@ def channels_of(
 ) -> dict[str, tuple[str, str]]:
     """The x and y channels for "prev" and "next"; one of them may not be there."""
     convention = CONVENTIONS[vectors.convention]
-    by_layer = _layers(names, near)
+    by_layer = _layers(names, near, vectors.layer)
     if vectors.layer is not None:
         members = by_layer[pick(by_layer, vectors.layer, "vector layer")]
         sides = [("next", convention.next)]
@@ -347,7 +412,7 @@ def is_direction_named(names: Iterable[str], vectors: Vectors, near: str | None 
     if vectors.convention != "plain":
         return True
     sides = channels_of(names, vectors, near)
-    return all(ending(_layer_of(names, pair, near), _DOWN) for pair in sides.values())
+    return all(ending(_layer_of(names, vectors, pair, near), _DOWN) for pair in sides.values())
 
 
 def read(
@@ -417,8 +482,10 @@ def mask_of(names: Iterable[str], vectors: Vectors, near: str | None = None) -> 
                 return member
     if vectors.convention != "rsmb":
         return None
-    sides = channels_of(names, vectors, near)
-    beside = by_layer[next(iter(sides.values()))[0].rpartition(".")[0]]
+    pair = next(iter(channels_of(names, vectors, near).values()))
+    beside = by_layer[pair[0].rpartition(".")[0]]
+    if rgb(beside) and not set(pair) <= set(rgb(beside)):  # the alpha of a picture beside them
+        return None
     return next((m for m in beside if component(m) in ("a", "alpha")), None)
 
 
