@@ -69,6 +69,20 @@ def test_damaged_bytes_are_counted_in_pictures(tmp_path, kind):
     assert any(word in said for word in ("could not be decoded", "are damaged", "pause once"))
 
 
+def test_a_wrong_checksum_is_damage(tmp_path):
+    """One byte of an animated PNG: its last rows were black, without a word."""
+    made = [clips.frame(clips.planes(n, (64, 48)), "yuv420p") for n in range(3)]
+    made = [one.reformat(format="rgb24") for one in made]
+    path = tmp_path / "a.apng"
+    clips.write(path, made, codec="apng", pixels="rgb24", tick=Fraction(1, 24))
+    data = bytearray(path.read_bytes())
+    data[data.index(b"fdAT") + 40] ^= 255
+    path.write_bytes(data)
+    reader = VideoReader(path)
+    assert [n for n, _ in reader] == [0, 2]
+    assert "1 of 3 pictures could not be decoded" in reader.loss()
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [(b"", "is empty"), (b"hello " * 100, "is not a video"), (None, "no such file")],

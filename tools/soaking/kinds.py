@@ -242,7 +242,7 @@ def _job(path: Path) -> None:
 def _options(path: Path) -> None:
     path.write_text(
         '[blur]\nshutter = 180.0\nphase = "centre"\ncurve = "box"\nsamples = 16\njitter = 0.5\n'
-        'max-blur = 40.0\nvectors = "blender"\nwindow = "grow"\ncompression = "zip"\nbits = 16\n'
+        'max-blur = 40.0\nvectors = "blender"\nwindow = "grow"\ncompression = "zip"\n'
         'layers = "all"\nframes = "1"\n'
     )
 

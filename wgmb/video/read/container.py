@@ -108,10 +108,14 @@ def largest_picture(stored: int, max_mb: float) -> dict[str, str]:
 
 
 def bound_pictures(container: InputContainer, bound: dict[str, str]) -> None:
-    """Bound the pictures that the decoders make, whose size may change within a stream."""
+    """Bound the pictures that the decoders make, whose size may change within a stream.
+
+    Decoders that know checksums, such as that of PNG, refuse what does not agree with its own.
+    """
+    more = bound | {"err_detect": "crccheck"}
     for stream in container.streams.video:
         if stream.codec_context is not None:
-            stream.codec_context.options = stream.codec_context.options | bound
+            stream.codec_context.options = stream.codec_context.options | more
 
 
 def picture_stream(container: InputContainer, path: Path | str) -> VideoStream:
