@@ -1,6 +1,7 @@
 """The vector convention is found on the neighbouring frames, and doubt is reported."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,6 +12,11 @@ from wgmb import Clip, Passes, Vectors
 from wgmb.sequence.layers import vector_test, vectors
 
 pytestmark = pytest.mark.fast
+
+
+def in_full(*cases):
+    """Cases that are tried with all others only."""
+    return [pytest.param(case, marks=pytest.mark.full) for case in cases]
 
 
 def found_of(color, motion, prev, next_, wanted):
@@ -137,7 +143,7 @@ def test_bad_vectors_and_pixels_do_not_stop_the_test():
 
 
 @pytest.mark.parametrize("flip", ["", "y", "xy"])
-@pytest.mark.parametrize("frames", [0.12, 0.3, 0.417, 0.8, 1.37, 3.7, 8.0])
+@pytest.mark.parametrize("frames", [0.12, 0.417, 0.8, 3.7, 8.0, *in_full(0.3, 1.37, 8.26)])
 def test_vectors_of_any_part_of_a_frame_are_found_out(frames, flip):
     turned = np.array([-1 if axis in flip else 1 for axis in "xy"], "f4")
     _, found = tried("nuke", n=1, velocity=(11.0, 6.0), wrong=lambda v: v * turned * frames)
@@ -145,7 +151,50 @@ def test_vectors_of_any_part_of_a_frame_are_found_out(frames, flip):
     assert found.notable
     assert found.vectors.flip == flip
     assert found.vectors.scale == pytest.approx(1 / frames, rel=0.02)
-    assert f"(vectors of {1 / found.vectors.scale:.3g} frames)" in found.text
+    ratio = f"{1 / found.vectors.scale:.3g}"
+    claims = f"(vectors of {ratio} frames)" in found.text
+    asks = f"they are {ratio} times as long as the motion, which is no known unit: check them"
+    assert claims == (frames < 1 or frames == 8)
+    assert (asks in found.text) != claims
+    assert (
+        f"`vector_scale={found.vectors.scale:g}`" in found.text.replace(" reads them so", "")
+    ) != claims
+
+
+@pytest.mark.parametrize("frames", [2.0, 2.5, *in_full(1.5, 4.0, 7.5, 10.0)])
+def test_whole_and_half_numbers_of_frames_are_known_units(frames):
+    _, found = tried("nuke", wrong=lambda v: v * frames)
+    assert found.vectors.scale == pytest.approx(1 / frames)
+    assert f"(vectors of {frames:g} frames), because" in found.text
+    assert "check" not in found.text
+
+
+def per_second(rate, flip=1, stated=None, velocity=(9.0, 5.0)):
+    """The finding about vectors in pixels per second."""
+    to_prev, to_next = (v * np.float32(rate) * (1, flip) for v in make.motion(2, velocity))
+    near = [make.picture(n, velocity) for n in (1, 3)]
+    motion = side_by_side((to_prev, to_next))
+    one = vector_test.gathered(make.picture(2, velocity), motion, *near, rate=stated)
+    return vector_test.decide(told("plain"), [one])
+
+
+@pytest.mark.parametrize("flip", [-1, *in_full(1)])
+@pytest.mark.parametrize("rate", [24, 60, *in_full(25, 30, 48, 50, 100, 120)])
+def test_pixels_per_second_are_a_known_unit(rate, flip):
+    found = per_second(rate, flip)
+    assert found.sure
+    assert found.vectors == told("plain", scale=round(1 / rate, 9), flip="y" if flip < 0 else "")
+    assert f"(pixels per second, at {rate} frames per second), because" in found.text
+
+
+def test_the_rate_of_the_file_is_a_known_unit_too():
+    asks = "they are 17 times as long as the motion, which is no known unit: check them"
+    assert f"{asks} (`vector_scale=0.0588`" in per_second(17).text
+    found = per_second(17, stated=17.0)
+    assert found.vectors.scale == pytest.approx(1 / 17)
+    assert "(pixels per second, at 17 frames per second)" in found.text
+    ntsc = 24 / 1.001
+    assert "at 23.976 frames" in per_second(ntsc, stated=ntsc).text
 
 
 @pytest.mark.parametrize("frames", [0.9, 1.0, 1.1])
@@ -216,6 +265,18 @@ def test_others_are_tested_on_the_first_the_middle_and_the_last(tmp_path):
     assert {1, 5, 9} <= set(clip.sizes)
     got = clip.frame(clip.source(4)).motion[..., 2:]
     np.testing.assert_allclose(got, make.motion(4)[1], atol=0.02)
+
+
+def test_the_rate_comes_from_the_frames(tmp_path):
+    for n in (1, 2, 3):
+        back, ahead = (v * np.float32(17) for v in make.motion(n))
+        channels = make.colors(make.picture(n)) | make.written("nuke", back, ahead)
+        make.write_exr(tmp_path / f"s.{n:04d}.exr", channels, {"framesPerSecond": Fraction(17)})
+    clip = Clip(tmp_path / "s.####.exr")
+    assert "(pixels per second, at 17 frames per second)" in clip.finding
+    np.testing.assert_allclose(
+        clip.frame(clip.source(2)).motion[..., 2:], make.motion(2)[1], atol=0.01
+    )
 
 
 # ---- vectors below a pixel ------------------------------------------------------------------

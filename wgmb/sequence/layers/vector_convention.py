@@ -177,7 +177,8 @@ class ConventionFinder:
             return vector_test.Evidence(doubt="no picture to test it on")
         motion = vectors.read(self._stored.own(source), named, source.reference_channel)
         seen, motion, prev, next_ = self._aligned(source, (seen, motion), look)
-        return vector_test.gathered(seen, motion, prev, next_, source.whole)
+        rate = float(source.rate) if source.rate else None
+        return vector_test.gathered(seen, motion, prev, next_, source.whole, rate)
 
     def _aligned(self, source: FrameFile, arrays: Sequence[np.ndarray], look: Look) -> list[Any]:
         """Arrays of a frame, and the images before and after it (or None), in one window."""

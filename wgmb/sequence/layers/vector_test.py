@@ -19,11 +19,16 @@ from .vectors import Vectors
 _PROBES = 20_000  # pixels compared at most
 _ROUGHLY = 800  # pixels compared while the scale is searched for
 _SCALES = np.geomspace(0.1, 10, 95)  # 5 % apart: half a pixel of a motion of 10
+_FAR = np.geomspace(1 / 250, 10, 161)  # of vectors that predict nothing: they may be of a second
 _NEARBY = 1.15  # of the least difference: as good while it is measured roughly
 _HARDLY = 0.85  # of the stated reading's difference, roughly: more is not clearly better
 _GOLDEN = (5**0.5 - 1) / 2
 _STEPS = 10  # of the golden section: to 0.1 % of the scale
-_PLAIN = tuple(sorted({float(n) for n in range(1, 11)} | {1 / n for n in range(2, 11)}))
+_NTSC = 1.001
+_RATES = (24, 24 / _NTSC, 25, 30, 30 / _NTSC, 48, 50, 60, 60 / _NTSC, 100, 120)
+"""Frames per second, of vectors in pixels per second."""
+_HALVES = tuple(n / 2 for n in range(2, 21))  # frames, that vectors may be of
+_PLAIN = tuple(sorted({float(n) for n in range(1, 11)} | {1 / n for n in (*_HALVES, *_RATES)}))
 _POWERS = tuple(2.0**n for n in range(1, 15))  # as which the longest motion is chosen [px]
 _FRACTIONS = (1.0, 0.5)  # of the picture's size: from 0 to 1, and from -1 to 1
 _FLIPS = ("", "y", "x", "xy")
@@ -81,6 +86,8 @@ class Evidence:
     """The picture differs from a neighbour by more than noise; only looked at where `is_below`."""
     whole: tuple[int, int] = (1, 1)
     """Width and height [px] of the whole picture."""
+    rate: float | None = None
+    """Frames per second, where the file states them."""
     doubt: str = ""
     """The reason why it cannot be tested."""
 
@@ -117,11 +124,13 @@ def gathered(
     prev: np.ndarray | None,
     next_: np.ndarray | None,
     whole: tuple[int, int] | None = None,
+    rate: float | None = None,
 ) -> Evidence:
     """The evidence of a frame: `color` and the neighbours (height, width, 3 or 4), linear.
 
     `motion`: (height, width, 4) [px], to_prev and to_next as they are read. A neighbour that is
-    not there, or of another size, is None. `whole`: width and height of the display window.
+    not there, or of another size, is None. `whole`: width and height of the display window. `rate`:
+    frames per second, where they are known.
     """
     sides = {
         side: (m, tone(c[..., :3]))
@@ -132,6 +141,7 @@ def gathered(
     moving = speeds > _MOVING
     fastest, is_below = _fastest(speeds), int(np.count_nonzero(moving)) < _FEWEST
     of = {"fastest": fastest, "is_below": is_below, "whole": whole or color.shape[1::-1]}
+    of["rate"] = rate
     if not sides:
         return Evidence(doubt="no neighbouring frame to test it on", **of)
     at = _some(moving if fastest >= _ACROSS else speeds > max(_SLOW * fastest, _NOTHING))
@@ -227,6 +237,7 @@ def decide(
     why = f"{left / still:.0%} of the difference to the next frame is left along them"
     text = (
         f"{meant}{_unit(best, tested[0])}, because {why}, and {stated / still:.0%} with {vectors}"
+        f"{_unknown(best, meant, tested[0])}"
     )
     return ConventionFinding(meant, True, text, notable=True, left=left / still)
 
@@ -251,7 +262,30 @@ def _unit(reading: _Reading, evidence: Evidence) -> str:
         return f" ({named.get(reading.unit, f'{reading.unit:.3g} of the picture')})"
     if evidence.is_below or (evidence.is_open and reading.x > _SCALES[-1]):
         return f" (1 is {reading.x:.4g} px)"
-    return f" (vectors of {1 / reading.x:.3g} frames)" if reading.x != 1 else ""
+    if reading.x in _seconds(evidence):
+        return f" (pixels per second, at {1 / reading.x:.5g} frames per second)"
+    is_known = reading.x > 1 or reading.x in _PLAIN  # below a frame: the time of an open shutter
+    return f" (vectors of {1 / reading.x:.3g} frames)" if reading.x != 1 and is_known else ""
+
+
+def _unknown(reading: _Reading, meant: Vectors, evidence: Evidence) -> str:
+    """The doubt about a reading that is no known unit, in words; "" if there is none."""
+    is_known = reading.x != reading.y or reading.x >= 1 or _unit(reading, evidence)
+    scale = ",".join(f"{s:g}" for s in dict.fromkeys(meant.scales))
+    return (
+        ""
+        if is_known
+        else (
+            f"; they are {1 / reading.x:.3g} times as long as the motion, which is no known unit: "
+            f"check them (`vector_scale={scale}` reads them so)"
+        )
+    )
+
+
+def _seconds(evidence: Evidence) -> tuple[float, ...]:
+    """The scales that make pixels per second pixels per frame, that of the file first."""
+    own = (1 / evidence.rate,) if evidence.rate else ()
+    return (*own, *(1 / rate for rate in _RATES))
 
 
 def _best(
@@ -262,6 +296,7 @@ def _best(
     for reading in _search(tested, probes, has_both):
         left[reading] = probes.difference(reading)
     least = min(left.values())
+    own = _seconds(tested[0])[:1] if tested[0].rate else ()
     # Of readings that do as well (nothing moves along y, say) the plainest.
     best = min(
         (k for k, d in left.items() if d <= _ALIKE * least),
@@ -269,7 +304,8 @@ def _best(
             len(_combine(vectors.flip, k.flip)),
             k.is_turned,
             k != _STATED,
-            k.unit not in (_FRACTIONS if k.x != k.y else (*_PLAIN, *_POWERS)),
+            k.unit not in (_FRACTIONS if k.x != k.y else (*_PLAIN, *_POWERS, *own)),
+            k.unit not in own,
             left[k],
         ),
     )
@@ -286,10 +322,10 @@ class _Unit:
     plain: tuple[float, ...]
 
 
-def _units(evidence: Evidence) -> list[_Unit]:
-    """The units that the vectors of some frames may have."""
+def _units(evidence: Evidence, is_lost: bool) -> list[_Unit]:
+    """The units that the vectors of some frames may have. `is_lost`: they predict nothing."""
     if not evidence.is_open:
-        return [_Unit(1.0, 1.0, _SCALES, _PLAIN)]
+        return [_Unit(1.0, 1.0, _FAR if is_lost else _SCALES, (*_PLAIN, *_seconds(evidence)))]
     width, height = evidence.whole
     span = np.log(width * 2) / np.log(_SCALES[1] / _SCALES[0])
     lengths = np.geomspace(0.5, width, int(span) + 1) / max(evidence.fastest, _NOTHING)
@@ -305,17 +341,18 @@ def _search(tested: Sequence[Evidence], probes: _Probes, has_both: bool) -> list
     None if no reading is clearly better than the stated one.
     """
     few = _Probes(tested, _ROUGHLY)
+    stated, still = few.difference(_STATED), few.difference(_Reading(x=0.0, y=0.0))
     turns = (False, True) if has_both else (False,)
     rough = {
         (unit, flip, turned): [
             few.difference(_reading(unit, flip, scale, turned)) for scale in unit.multiples
         ]
-        for unit in _units(tested[0])
+        for unit in _units(tested[0], stated > _HARDLY * still)
         for flip in _FLIPS
         for turned in turns
     }
     least = min(map(min, rough.values()))
-    if least > _HARDLY * few.difference(_STATED):
+    if least > _HARDLY * stated:
         return []
     most, found = _NEARBY * least, []
     for (unit, flip, turned), differences in rough.items():
@@ -336,10 +373,8 @@ def _refined(
     found = [_reading(unit, flip, float(f"{scale:.3g}"), turned)]
     if (unit.x, unit.y) == (1, 1):
         found.append(_reading(unit, flip, 1.0, turned))
-    plain = min(unit.plain, key=lambda p: abs(np.log(p / scale)))
-    if abs(np.log(plain / scale)) < np.log(step):
-        found.append(_reading(unit, flip, plain, turned))
-    return found
+    near = [plain for plain in unit.plain if abs(np.log(plain / scale)) < np.log(step)]
+    return found + [_reading(unit, flip, plain, turned) for plain in near]
 
 
 def _reading(unit: _Unit, flip: str, scale: float, turned: bool) -> _Reading:
