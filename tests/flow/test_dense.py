@@ -8,7 +8,7 @@ import wgpu
 
 import wgmb
 from twins import dense as twin
-from wgmb.color.srgb import to_display
+from wgmb.color.srgb import linear, to_display
 from wgmb.errors import InputError
 from wgmb.flow.dense import DenseInverseSearch
 from wgmb.flow.dense.stages import STATE, sizes_of
@@ -137,6 +137,26 @@ def test_a_body_before_a_ground_is_found(found):
     far = np.s_[:, : left - SPEED - 24]
     assert np.abs(found.motion[far]).max() < 0.5
     assert found.depth[inside].max() < found.depth[far].min()
+
+
+@pytest.mark.parametrize("speeds", [(6, -5), (0, 0)])
+def test_hardly_a_block_is_searched_in_a_dissolve(device, speeds):
+    """Its light changes evenly, so places that fit neither neighbour fit the mean of both."""
+
+    def picture(n):
+        if not 0 <= n < 4:
+            return None
+        one, other = (
+            to_display(soft(WIDTH + 40, HEIGHT, cell, cell)[:, 20 + v * n :][:, :WIDTH], 8)
+            for cell, v in zip((9, 14), speeds, strict=True)
+        )
+        return linear(((1 - n / 4) * one + n / 4 * other).astype("f4") / 255)
+
+    source = DenseInverseSearch(device=device)
+    source.shot(picture)(2)
+    stages, encoder = source.pictures((WIDTH, HEIGHT)).stages, device.create_command_encoder()
+    ways = stages.images.download(encoder, stages.images.texture("ways", (40, 13), STATE))
+    assert (ways[..., 2] > 0).mean() < 0.05  # half of all without this rule
 
 
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (-7, 3), (2.5, -1.5)])

@@ -14,6 +14,7 @@ pytest.importorskip("cv2")
 import cv2
 
 from wgmb.flow.dis import Dis
+from wgmb.flow.dis.blocks import searched
 from wgmb.flow.dis.by_place import ByPlace
 from wgmb.video import gpu_frames
 
@@ -116,6 +117,28 @@ def test_blocks_find_a_body_that_dense_inverse_search_loses():
     assert np.abs(found - [-48, 0, 48, 0]).max() < 2
     first = ByPlace().motion([None, *pictures[1:3]])[row, 106:122]
     assert np.abs(first - [-48, 0, 48, 0]).max() < 2
+
+
+def dissolve(moment, speeds):
+    """A picture between two textures that move to the left, each by its own speed [px]."""
+    shown = []
+    for cell, speed in zip((9, 12), speeds, strict=True):
+        shift = np.float32([[1, 0, -40 - speed * moment], [0, 1, 0]])
+        shown.append(
+            cv2.warpAffine(texture(WIDTH + 80, HEIGHT, cell, cell), shift, (WIDTH, HEIGHT))
+        )
+    share = moment / 6
+    return ((1 - share) * shown[0] + share * shown[1]).clip(0, 1)
+
+
+@pytest.mark.parametrize("speeds", [(0, 0), (3, 8), (9, 2)])
+def test_no_body_is_found_in_a_dissolve(speeds):
+    """It has the motion of dense inverse search, as its light changes evenly."""
+    pictures = [np.rint(255 * dissolve(n, speeds)[..., 1]).astype("u1") for n in range(6)]
+    for n in range(1, 5):
+        near = pictures[n - 1 : n + 2]
+        found = searched(near, Dis("fast").motion(near))
+        assert found is None or found.other.mean() < 0.03
 
 
 @pytest.mark.parametrize("kind", ["textured", "moving"])

@@ -31,7 +31,9 @@ BLOCK, SPACING = map(int, constants("summary", "BLOCK", "SPACING"))
 REACH, ALIKE, LEVEL, OTHER, MOST_SQUARE = constants(
     "blocks", "REACH", "ALIKE", "LEVEL", "OTHER", "MOST_SQUARE"
 )
-UNFIT, CHANGED, FLAT = constants("unfit", "UNFIT", "CHANGED", "FLAT")
+UNFIT, CHANGED, FLAT, LEAST_EVEN, REGION = constants(
+    "unfit", "UNFIT", "CHANGED", "FLAT", "LEAST_EVEN", "REGION"
+)
 MOST_OTHER, OTHERWISE, BETTER, MORE = constants("spread", "MOST_OTHER", "APART", "BETTER", "LEVEL")
 (NOISE,) = constants("summarize", "NOISE")
 (AWAY,) = constants("raising", "AWAY")
@@ -104,12 +106,27 @@ class Reduced:
         return soft
 
     def unfit(self, state: np.ndarray) -> np.ndarray:
-        """Levels by which places that change fit neither neighbour, 0 for all others."""
+        """Levels by which places that change fit neither neighbour, 0 for all others.
+
+        In a dissolve, light changes evenly: many places that fit neither neighbour fit the mean of
+        both. Around these it is 0, as no body is lost there.
+        """
         better, _ = self.differences(state)
         changes = [_cv().absdiff(self.here, other) for other in self.sides.values()]
         changes = _cv().blur(np.minimum.reduce(changes), (3, 3))
         is_there = (better > UNFIT) & (changes > CHANGED + np.percentile(changes, 100 * NOISE))
+        if len(self.sides) == 2:
+            is_there &= ~self._is_even(state, is_there)
         return np.where(is_there, better, 0)
+
+    def _is_even(self, state: np.ndarray, unfit: np.ndarray) -> np.ndarray:
+        """(height, width) bool: places around which some of the unfit fit the mean of both."""
+        prev, next = (self.moved(self.sides[side], way_of(state, side)) for side in (0, 1))
+        apart = _cv().min(_cv().absdiff((prev + next) / 2, self.here), MOST_APART)
+        even = unfit & (_cv().blur(apart, (3, 3)) <= UNFIT)
+        side = 2 * int(REGION) + 1
+        evens, all = (_cv().blur(n.astype(np.float32), (side, side)) for n in (even, unfit))
+        return evens > LEAST_EVEN * all
 
 
 class Blocks(NamedTuple):

@@ -5,7 +5,7 @@
 
 @group(1) @binding(2) var motion: texture_2d<f32>;      // of the whole picture [px]
 @group(1) @binding(3) var begin: texture_storage_2d<rgba32float, write>;    // the same on this level [px of it]
-@group(1) @binding(4) var fits: texture_storage_2d<rgba32float, write>;     // difference along it; change; both [levels]
+@group(1) @binding(4) var fits: texture_storage_2d<rgba32float, write>;     // difference along it; change; difference to the mean
 @group(1) @binding(5) var<storage, read_write> tables: array<atomic<u32>>;  // TABLES of BINS, all 0 at first
 
 const MEANS: i32 = 4;       // pixels a side, evenly spaced, of which a small one is the mean
@@ -25,7 +25,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(begin, px, state);
     let apart = differences(px, state, RADIUS);
     let change = changes(px);
-    textureStore(fits, px, vec4f(apart.better, change, 0.0, 0.0));
+    textureStore(fits, px, vec4f(apart.better, change, apart.mean, 0.0));
     atomicAdd(&tables[bin(CHANGES, change * BINS_PER_LEVEL)], 1u);
     let ways = state * BINS_PER_PIXEL + f32(BINS / 2u);
     atomicAdd(&tables[bin(PREV_X, ways.x)], 1u);

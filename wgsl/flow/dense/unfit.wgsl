@@ -18,6 +18,10 @@ struct Groups {         // of workgroups, one for each block of the list, as ind
 const BESIDE: i32 = 4;          // px around the place of a block in which one that does not fit is enough
 const UNFIT: f32 = 7.0;         // levels of 255 of difference to the better neighbour
 const CHANGED: f32 = 10.0;      // levels by which such a place must differ from both neighbours, beyond noise
+const LEAST_EVEN: f32 = 0.3;    // share of such places which, if they fit the mean of both neighbours, show that light
+                                // changes evenly, as in a dissolve: no body is lost there,
+const REGION: i32 = 32;         // in the square up to so many px around a place, about as far as blocks are searched
+const STEP: i32 = 2;            // px from one place that is counted to the next
 const FLAT: f32 = 6.25;         // variance [squared levels] of a block that tells nothing
 
 @compute @workgroup_size(WG_X, WG_Y)
@@ -31,17 +35,36 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     textureStore(output, id.xy, vec4f(0.0));
     let cell = vec2i(id.xy);
     let side = SPACING + 2 * BESIDE;
-    let last = vec2i(textureDimensions(fits)) - 1;
-    let least = CHANGED + summary.noise[0];
-    var is_unfit = false;
+    var fits_neither = false;
     for (var k = 0; k < side * side; k++) {
-        let px = clamp(cell * SPACING - BESIDE + vec2i(k % side, k / side), vec2i(0), last);
-        let fit = textureLoad(fits, px, 0);
-        is_unfit = is_unfit || (fit.x > UNFIT && fit.y > least);
+        fits_neither = fits_neither || is_unfit(fit_of(cell * SPACING - BESIDE + vec2i(k % side, k / side)));
     }
-    if is_unfit && variance(cell) > FLAT {
+    if fits_neither && variance(cell) > FLAT && !is_even(cell) {
         list.blocks[atomicAdd(&groups.count, 1u)] = id.y * cells.x + id.x;
     }
+}
+
+/// The output of measure.wgsl at a place, or at the nearest one inside.
+fn fit_of(place: vec2i) -> vec4f {
+    return textureLoad(fits, clamp(place, vec2i(0), vec2i(textureDimensions(fits)) - 1), 0);
+}
+
+fn is_unfit(fit: vec4f) -> bool {
+    return fit.x > UNFIT && fit.y > CHANGED + summary.noise[0];
+}
+
+/// True if light changes evenly around a block.
+fn is_even(cell: vec2i) -> bool {
+    let side = 2 * REGION / STEP + 1;
+    var all = 0.0;
+    var even = 0.0;
+    for (var k = 0; k < side * side; k++) {
+        let fit = fit_of(cell * SPACING + SPACING / 2 - REGION + STEP * vec2i(k % side, k / side));
+        let counts = select(0.0, 1.0, is_unfit(fit));
+        all += counts;
+        even += select(0.0, counts, fit.z <= UNFIT);
+    }
+    return even > LEAST_EVEN * all;
 }
 
 fn variance(cell: vec2i) -> f32 {
