@@ -33,9 +33,9 @@ class Cone:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.rate) and 1 <= self.rate <= 10_000):
-            raise InputError(f"rate must be 1 to 10000 per second, got {self.rate}")
+            raise InputError(f"cone rate must be 1 to 10000 per second, got {self.rate}")
         if not (math.isfinite(self.peak) and 0 <= self.peak <= 1):
-            raise InputError(f"peak must be 0 to 1 second, got {self.peak}")
+            raise InputError(f"cone peak must be 0 to 1 second, got {self.peak}")
 
     @property
     def shift(self) -> float:

@@ -135,7 +135,7 @@ class Frame:
             object.__setattr__(self, "object_id", ids)
         check_choice("`wrap`", self.wrap, ("off", "on"))
         if self.camera is not None and self.wrap == "on":
-            raise InputError("a panorama takes no camera: that is for perspective and orthographic")
+            raise InputError("a panorama takes no camera; cameras are perspective or orthographic")
         if self.camera is not None and self.depth is None:
             raise InputError("motion from a camera needs depth")
         object.__setattr__(self, "window", window_of(self.window, self.camera))

@@ -48,9 +48,9 @@ class Render:
     ):
         gpu.check_size(blur.device, *size)
         if not 0 < fps <= 100_000:
-            raise InputError(f"fps must be over 0 and at most 100000, got {fps}")
+            raise InputError(f"`fps` must be over 0 and at most 100000, got {fps}")
         if not 1 <= antialias <= MOST_RAYS:
-            raise InputError(f"antialias must be 1 to {MOST_RAYS}, got {antialias}")
+            raise InputError(f"`antialias` must be 1 to {MOST_RAYS}, got {antialias}")
         self.scene, self.blur, self.size, self.fps, self.antialias = (
             scene,
             blur,
@@ -277,7 +277,7 @@ class Render:
         """Return the scene on the GPU for the time span that the blur reads around `time` [s]."""
         blur = blur or self.blur
         if not np.isfinite(time):
-            raise InputError(f"time must be finite, got {time}")
+            raise InputError(f"`time` must be finite, got {time}")
         moment = (time, id(self.scene), self.size, self.fps, self.antialias)
         if moment != self._moment:
             self._moment, self._spans, self._pictures, self._lights = moment, {}, {}, {}

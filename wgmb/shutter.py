@@ -86,15 +86,15 @@ class Shutter:
     def __post_init__(self) -> None:
         text = isinstance(self.degrees, str)
         if text or not (math.isfinite(self.degrees) and 0 <= self.degrees <= 36000):
-            raise InputError(f"shutter must be 0 to 36000 degrees, got {self.degrees!r}")
+            raise InputError(f"`shutter` must be 0 to 36000 degrees, got {self.degrees!r}")
         if isinstance(self.phase, str) and self.phase not in PHASES:
-            check_choice("phase", self.phase, ("start", "centre", "end"), " or a number")
+            check_choice("`phase`", self.phase, ("start", "centre", "end"), " or a number")
         if not isinstance(self.phase, str) and not abs(self.phase) <= 100:
-            raise InputError(f"phase must be within 100 frame intervals, got {self.phase}")
+            raise InputError(f"`phase` must be within 100 frame intervals, got {self.phase}")
         if isinstance(self.curve, str):
-            check_choice("curve", self.curve, CURVES)
+            check_choice("`curve`", self.curve, CURVES)
         if self.rolling is not None:
-            check_choice("rolling", self.rolling, ROLLING)
+            check_choice("`rolling`", self.rolling, ROLLING)
         if not (math.isfinite(self.rolling_duration) and 0 <= self.rolling_duration <= 100):
             raise InputError(
                 f"`rolling_duration` must be 0 to 100 frame intervals, got {self.rolling_duration}"

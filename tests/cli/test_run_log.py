@@ -73,7 +73,7 @@ def test_an_error_before_the_first_frame_is_in_the_log(frames, capsys):
 def test_a_file_that_is_no_log_and_a_pipe_that_has_pictures_are_refused(frames, capsys):
     before = (frames / "shot.0001.exr").read_bytes()
     code, _, err = make.inside(capsys, *BLUR, "--log-json", "shot.0001.exr")
-    assert code == 2 and "shot.0001.exr: the file is there and is no log" in err
+    assert code == 2 and "shot.0001.exr: the file exists, but is no log" in err
     assert (frames / "shot.0001.exr").read_bytes() == before
     code, _, err = make.inside(capsys, "blur", "-", "-o", "-", "--log-json", "-")
     assert (code, len(err.splitlines())) == (2, 1)

@@ -340,7 +340,9 @@ def test_a_part_that_never_ends_is_given_to_another_worker_and_the_first_result_
     assert sorted(n for n, _ in ticks) == report.done
     (part,) = [chosen for name, chosen in client.given if name == "b"]
     assert ("a", part) in client.given
-    assert notes == [f"worker 1 on there does nothing: it does not end frames {frame_list(part)}"]
+    assert notes == [
+        f"worker 1 on there does nothing: it does not finish frames {frame_list(part)}"
+    ]
 
 
 def test_a_part_that_takes_long_is_left_to_its_worker_while_none_has_ended(drive, monkeypatch):

@@ -184,7 +184,7 @@ def test_what_does_not_fit_is_one_line(hosted, device):
     for bad, settings, said in (
         (loose, {}, "wgmb: the clip has no constant rate; `std.AssumeFPS` sets one"),
         (deep, {}, "wgmb: YUV444PS is not taken: float pictures are RGBS or RGBH"),
-        (clip, {"fps": 0}, "wgmb: fps must be"),
+        (clip, {"fps": 0}, "wgmb: `fps` must be"),
         (clip, {"shuter": 9}, "wgmb: unknown setting 'shuter'"),
         (clip, {"flow": "best"}, "wgmb: "),
     ):

@@ -225,7 +225,7 @@ def test_an_attribute_that_is_divided_by_0_is_left_out_and_named(tmp_path, value
     for header_only in (True, False):
         part = exr.read(path, header_only=header_only).parts[0]
         assert part.attributes["owner"] == "me" and "framesPerSecond" not in part.attributes
-        assert part.notes == ("attribute framesPerSecond is divided by 0, and left out",)
+        assert part.notes == ("attribute framesPerSecond has a denominator of 0, and is left out",)
     np.testing.assert_array_equal(part.channels["R"], channels()["R"])
 
 

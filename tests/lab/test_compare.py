@@ -350,7 +350,7 @@ def test_three_files_are_before_here_and_after(tmp_path):
         np.testing.assert_array_equal(a.color, b.color)
     with pytest.raises(InputError, match="missing frame 7"):
         cases.clip_case("x", Shutter(180), [shot], truth, {}, partial(Clip, frames="7"))
-    with pytest.raises(InputError, match="got frames 1-3, but a truth is of one; `frames`"):
+    with pytest.raises(InputError, match="got frames 1-3, but a truth shows one frame; `frames`"):
         cases.clip_case("x", Shutter(180), [shot], truth, {})
     with pytest.raises(InputError, match="one file or three, got 2"):
         cases.clip_case("x", Shutter(180), files[:2], truth, {})

@@ -208,7 +208,7 @@ WRONG = {
     "no module": ("raise RuntimeError('no licence\\nat all')",
                   "other:Mine cannot be imported: RuntimeError: no licence at all"),
     "it ends": ("raise SystemExit(3)", "other:Mine cannot be imported: SystemExit: 3"),
-    "no class": ("Mine = 5", "a method is a class, got 5"),
+    "no class": ("Mine = 5", "a method must be a class, got 5"),
     "another name": (GOOD.replace('"mine"', '"other"'), "its class has the name 'other'"),
     "no name": (GOOD.replace('"mine"', "None"), "needs a name of small letters and digits"),
     "needs": (GOOD.replace('{"color"}', '{"colour"}'), "needs has colour; known are color, depth"),

@@ -183,20 +183,20 @@ def test_what_is_not_finite_is_named(device):
 
 @pytest.mark.parametrize("settings, said", [
     ({"fps": 60}, "`fps` needs the rate of the pictures; set `fps_in`"),
-    ({"fps_in": 0}, "fps_in must be 0.001 to 1000"),
+    ({"fps_in": 0}, "`fps_in` must be 0.001 to 1000"),
     ({"transfer": "log"}, "transfer"),
     ({"shuter": 90}, "unknown setting 'shuter'.*shutter"),
-    ({"flow": "best"}, "flow must be .* got 'best'"),
-    ({"flow_quality": "bets"}, "flow_quality must be .* did you mean 'best'"),
+    ({"flow": "best"}, "`flow` must be .* got 'best'"),
+    ({"flow_quality": "bets"}, "`flow_quality` must be .* did you mean 'best'"),
     ({"fsp": 60}, "^unknown setting 'fsp'; did you mean 'fps'\\?$"),
     ({"angle": 90}, "^unknown setting 'angle'; did you mean 'shutter'\\?$"),
     ({"no_flow": True}, "^unknown setting 'no_flow'; did you mean flow='none'\\?$"),
     ({"log": 1}, "^unknown setting 'log'$"),
     ({"flow": "dis", "flow_quality": "draft"}, "`flow_quality` draft is for `flow` search"),
-    ({"duplicates": "z"}, "duplicates must be"),
+    ({"duplicates": "z"}, "`duplicates` must be"),
     ({"codec": "h264"}, "unknown setting 'codec'"),
     ({"holdout": np.zeros((64, 96)), "flow": "none"}, "`holdout` needs motion"),
-    ({"holdout": np.zeros(3)}, r"holdout must be \(height, width\)"),
+    ({"holdout": np.zeros(3)}, r"`holdout` must be \(height, width\)"),
     ({"highlights": 4.0, "transfer": "linear"}, "not for HDR"),
 ])  # fmt: skip
 def test_settings_that_do_not_fit_are_refused_at_once(device, settings, said):

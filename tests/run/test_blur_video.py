@@ -485,7 +485,7 @@ def test_python_makes_what_the_command_line_makes(tmp_path, capsys, device):
     [
         ({"ftps": 12}, "unknown setting 'ftps'; did you mean 'fps'"),
         ({"vectors": "nuke"}, "unknown setting 'vectors'"),
-        ({"fps": "fast"}, "fps must be a number"),
+        ({"fps": "fast"}, "`fps` must be a number"),
         ({"speed": 0}, "`speed` must be 0.01 to 100, got 0"),
         ({"flow": "none", "holdout": "static"}, "`holdout` needs motion"),
         ({}, "exists; `overwrite=True` replaces it"),

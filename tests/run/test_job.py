@@ -310,7 +310,7 @@ def test_words_that_do_not_go_with_a_job_are_one_line(own, capsys, words, says):
         ("-o o.####.exr -j a.json --chunk 0", "--chunk must be 1 frame or more"),
         ("-o o.####.exr -j a.json --method gahter", "did you mean 'gather'"),
         ("-o o.####.exr -j a.json --method tap --weights published", "method 'tap' has no option"),
-        ("-o o.####.exr -j a.json --samples 5000", "samples must be 1 to 4096"),
+        ("-o o.####.exr -j a.json --samples 5000", "--samples must be 1 to 4096"),
         ("-o in/shot.####.exr -j a.json", "is the input"),
         ("-o parts/o.####.exr -j a.json", "o.0001.exr exists; --overwrite replaces it"),
         ("-o o.####.png -j a.json --confidence", "needs an .exr output"),

@@ -230,7 +230,7 @@ def test_what_is_no_video_is_one_line(data, said):
     ("- -o - --begin 1", "--begin is for files"),
     ("- -o - --frames 1-9", "--frames is for files"),
     ("- -o - --holdout static", "--holdout of a video is for files"),
-    ("- x -o -", "a pipe stands alone"),
+    ("- x -o -", "a pipe must be the only input"),
 ])  # fmt: skip
 def test_what_a_pipe_cannot_is_one_line_before_anything_is_opened(words, said, capfd, monkeypatch):
     monkeypatch.setattr("wgmb.gpu.open_device", None)

@@ -310,9 +310,9 @@ def test_what_leaves_the_numbers_is_refused(name, settings, who, method):
 )
 def test_what_is_no_rendering_is_refused(options):
     name, value = next(iter(options.items()))
-    with pytest.raises(InputError, match=f"{name} must be .*{value}"):
+    with pytest.raises(InputError, match=f"`{name}` must be .*{value}"):
         wgmb.Render(crowd(1), wgmb.Blur("tap"), **options)
-    with pytest.raises(InputError, match="time must be finite"):
+    with pytest.raises(InputError, match="`time` must be finite"):
         wgmb.Render(crowd(1), wgmb.Blur("tap"))(float("inf"))
 
 

@@ -112,7 +112,7 @@ def test_gaps_are_told(tmp_path, capsys):
         make.write_exr(tmp_path / f"t.{number:04}.exr", make.frame(number))
     for name, says in {
         "g": "frames 2-6x2: a neighbouring frame is missing",
-        "t": "frames are 2 apart: the shutter and the vectors count intervals of one frame",
+        "t": "frames are 2 apart, but the shutter and the vectors count intervals of one frame",
     }.items():
         pattern, out = tmp_path / f"{name}.####.exr", tmp_path / f"{name}.out.####.exr"
         code, _, err = make.inside(capsys, "blur", pattern, "-o", out, "--skip-missing")

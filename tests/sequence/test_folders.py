@@ -92,8 +92,8 @@ def test_passes_of_other_frames_are_left_out_and_named(tmp_path):
         (tmp_path / f"depth.{n:04}.exr").rename(tmp_path / f"mv.{1000 + n}.exr")
     found = frames_in(tmp_path)
     assert not found.also
-    left_out = "vectors mv.####.exr left out, as they are frames 1004-1006"
-    assert found.text.endswith(f"; {left_out}, and the picture is frames 4-6")
+    left_out = "vectors mv.####.exr left out, as it holds frames 1004-1006"
+    assert found.text.endswith(f"; {left_out}, and the picture holds frames 4-6")
 
 
 def test_a_folder_is_blurred_in_one_command(tmp_path, capsys):

@@ -615,7 +615,7 @@ def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind)
     clip = Clip(pattern)
     near, far = order_of(clip)
     assert 0 < near < far
-    told = [text for text in clip.notes if "larger depth is nearer" in text]
+    told = [text for text in clip.notes if "larger depth is taken as nearer" in text]
     assert len(told) == (kind != "planar")
     if kind != "1 / z":
         assert (near, far) == pytest.approx({"white-near": (1 / 0.875, 8)}.get(kind, (3, 9)))
@@ -623,7 +623,7 @@ def test_the_order_of_depth_is_found_by_what_covers_what(tmp_path, capsys, kind)
     assert tuple(order_of(settled)) == (near, far)
     code, out, _ = make.inside(capsys, "info", pattern)
     assert code == 0
-    assert ("larger depth is nearer" in out) == (kind != "planar")
+    assert ("larger depth is taken as nearer" in out) == (kind != "planar")
 
 
 @pytest.mark.parametrize("empty", [np.inf, *in_full(0.0, 1e10, np.nan)])

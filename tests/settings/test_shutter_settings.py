@@ -35,7 +35,7 @@ def test_other_texts_are_refused(text):
 
 @pytest.mark.fast
 @pytest.mark.parametrize(
-    ("angle", "said"), [(0.5, "Blender's 0.5 is 180"), (1, "Blender's 1 is 360"),
+    ("angle", "said"), [(0.5, "Blender's 0.5 is 180 degrees"), (1, "Blender's 1 is 360 degrees"),
                         (0, ""), (5, ""), (180, ""), (None, ""), ("1/48", "")],
 )  # fmt: skip
 def test_an_angle_that_is_none_is_told(angle, said):
@@ -91,7 +91,9 @@ def test_few_degrees_are_told_of_videos_and_frames(tmp_path, capsys):
     for words in (video, rendered):
         code, _, err = make.inside(capsys, "blur", *words, "--shutter", "0.5")
         assert code == 0
-        assert "--shutter 0.5 means degrees, which hardly blur; Blender's 0.5 is 180\n" in err
+        assert (
+            "--shutter 0.5 is in degrees, and hardly blurs; Blender's 0.5 is 180 degrees\n" in err
+        )
 
 
 def test_pictures_need_their_rate(tmp_path):

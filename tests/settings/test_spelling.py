@@ -217,7 +217,7 @@ def test_a_value_of_another_kind_is_told_in_words(capsys, option, value, says):
             "render wheel",
             "render needs --output (-o) and its value; `wgmb render --help` tells more",
         ),
-        ("doctor now", "doctor takes no such word: 'now'; `wgmb doctor --help` tells more"),
+        ("doctor now", "doctor does not take the word 'now'; `wgmb doctor --help` tells more"),
         ("blur a.mp4 -o b.mp4 -vv", "-v is given more than once"),
         ("vectors a.exr -o b.exr", "--as is missing; the vectors can be nuke, rsmb,"),
     ],

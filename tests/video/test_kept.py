@@ -257,7 +257,7 @@ def test_two_views_are_kept_or_said(tmp_path, mode, to):
     source = matroska(tmp_path / "a.mkv", setup=setup)
     report = blur_video(source, tmp_path / f"b.{to}", flow="none")
     is_held = to == "mkv" or (to == "mp4" and mode in ("left_right", "top_bottom"))
-    said = f"that it has two views ({mode.replace('_', ' ')}) is not kept (.mkv holds most)"
+    said = f"its stereo layout ({mode.replace('_', ' ')}) is not kept (.mkv holds most)"
     assert (said in report.left_out) != is_held
     views = dict(describe_video(VideoReader(source)))["views"]
     assert views == f"two in a picture: {mode.replace('_', ' ')}"
@@ -287,9 +287,9 @@ def test_a_projection_and_two_views_go_through_pipes_or_are_said(tmp_path, devic
     assert stated.projection is not None and stereo_mode(stated) == "top_bottom"
     said = piped(source, STDOUT, stdout=io.BytesIO()).left_out
     assert [line.split(";")[0] for line in said] == [
-        "YUV4MPEG2 states no colours, and players assume others",
+        "YUV4MPEG2 does not state colours, so players may show wrong ones",
         "its projection (360 degrees) is not kept (.mkv and .mp4 hold most)",
-        "that it has two views (top bottom) is not kept (.mkv holds most)",
+        "its stereo layout (top bottom) is not kept (.mkv holds most)",
     ]
     kept = io.BytesIO()
     assert piped(source, STDOUT, "ffv1", kept).left_out == []

@@ -13,7 +13,7 @@ import wgmb
 pytest.importorskip("cv2")
 
 WIDTH, HEIGHT, COUNT = 320, 180, 6
-LINE = "something moves too far to be followed, or is there in one picture alone"
+LINE = "something moves too far to be followed, or is in one picture only"
 
 
 def jumping(step: int) -> list[np.ndarray]:

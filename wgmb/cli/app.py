@@ -235,7 +235,9 @@ def _plainly(text: str, words: list[str]) -> str:
         value = " and its value" if option.startswith("-") else ""
         return f"{missing[1]} needs {option}{value}; `wgmb {missing[1]} --help` tells more"
     if unused := re.fullmatch(r"Unused Tokens: \['?(.*?)'?(?:, .*)?\]\.", text):
-        return f"{words[0]} takes no such word: {unused[1]!r}; `wgmb {words[0]} --help` tells more"
+        return (
+            f"{words[0]} does not take the word {unused[1]!r}; `wgmb {words[0]} --help` tells more"
+        )
     if twice := re.fullmatch(r"Parameter (\S+) specified multiple times\.", text):
         return f"{twice[1]} is given more than once"
     text = re.sub(r"^Invalid value for \[(\w+)\] from (.+?): ", r"\2: \1: ", text)

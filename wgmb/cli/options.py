@@ -98,7 +98,7 @@ class BlurOptions(BlurSettings):
         str | None,
         Parameter(
             help=f"{', '.join(_FRAME_METHODS)}, for scenes also {', '.join(_SCENE_METHODS)}; "
-            "by default the one that suits."
+            "by default the one that suits the input."
         ),
     ] = None
 
@@ -227,8 +227,8 @@ Adapter = Annotated[str | None, Parameter(group=RUN)]
 LogJson = Annotated[
     str | None,
     Parameter(
-        help="File to which lines of JSON are added, for the run's start, each frame and its end; "
-        "- is standard output.",
+        help="File to which a line of JSON is added at the start of the run, for each frame, and "
+        "at the end of the run; - is standard output.",
         group=RUN,
     ),
 ]

@@ -112,7 +112,9 @@ def _opened(path: Path, command: str) -> _Log:
         with open(path, "rb") as file:
             first = file.read(len(_BEGINNING))
         if first and first != _BEGINNING:
-            raise InputError(f"--log-json {path}: the file is there and is no log; name another")
+            raise InputError(
+                f"--log-json {path}: the file exists, but is no log; name another file"
+            )
     return _Log(str(path), command, os.open(path, flags | os.O_CREAT, 0o600))
 
 

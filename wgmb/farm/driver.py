@@ -274,7 +274,9 @@ class Driver:
             if (part := other.part) is None or other.since > late or not self._slowest:
                 continue
             if len(self._holders(part)) == 1 and worker.address not in part.refused_by:
-                self._farm.details(f"worker {other.name} does not end {frame_list(part.numbers)}")
+                self._farm.details(
+                    f"worker {other.name} does not finish {frame_list(part.numbers)}"
+                )
                 self._hand_over(worker, part)
                 return
 
@@ -291,7 +293,7 @@ class Driver:
             worker.part = None
             worker.future.release()
             if worker.since < since:
-                worker.why_not = f"it does not end frames {frame_list(part.numbers)}"
+                worker.why_not = f"it does not finish frames {frame_list(part.numbers)}"
                 self._refuse(worker, False)
                 self._kill(worker)
 

@@ -217,7 +217,7 @@ def _fill_gaps(part: Part, sampling: dict[str, tuple[int, int]]) -> None:
 
 def check_compression(name: str) -> None:
     """InputError unless `name` is in COMPRESSIONS, or "same": as the file that was read."""
-    check_choice("compression", name, (*COMPRESSIONS, _SAME))
+    check_choice("`compression`", name, (*COMPRESSIONS, _SAME))
 
 
 def encode(
@@ -323,7 +323,9 @@ def _promised(path: Path, part: Any, unknown: Collection[str]) -> Part:
         raise InputError(f"{path}: has a part without channels")
     attributes = {k: v for k, v in header.items() if k not in _WRITTEN_ANEW}
     lost = [name for name in unknown if attributes.pop(name, None) is not None]
-    notes = tuple(f"attribute {name} is divided by 0, and left out" for name in sorted(lost))
+    notes = tuple(
+        f"attribute {name} has a denominator of 0, and is left out" for name in sorted(lost)
+    )
     name, compression = header.get("name", "") or "", header["compression"]
     return Part(name, channels, attributes, data, display, compression, notes)
 

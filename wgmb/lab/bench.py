@@ -68,9 +68,9 @@ def bench(
     the figures up to then.
     """
     if rounds < 1:
-        raise InputError(f"rounds must be 1 or more, got {rounds}")
+        raise InputError(f"`rounds` must be 1 or more, got {rounds}")
     if not limit > 0:
-        raise InputError(f"seconds must be over 0, got {limit}")
+        raise InputError(f"`seconds` must be over 0, got {limit}")
     matrix = _Matrix(device, list(candidates), rounds, limit, tell)
     sizes, flows = sorted(sizes, key=math.prod), list(flows)
     groups = list(itertools.product(sizes, sorted(samples))) if matrix.candidates else []

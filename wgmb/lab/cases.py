@@ -209,7 +209,7 @@ def clip_case(
     files of the frames before, here and after. `truth`: one file, or two independent halves of it.
     """
     if len(truth) not in (1, 2):
-        raise InputError(f"truth must be one file or two halves of it, got {len(truth)}")
+        raise InputError(f"`truth` must be one file or two halves of it, got {len(truth)}")
     if len(inputs) == 3:
         before, here, after = (
             clip.with_neighbours(clip.source(clip.numbers[0]), extent=EVERYWHERE)
@@ -220,13 +220,13 @@ def clip_case(
         clip = open_clip(inputs[0])
         if len(clip.numbers) > 1:
             raise InputError(
-                f"{inputs[0]}: got frames {frame_list(clip.numbers)}, but a truth is of one; "
-                "`frames` chooses it"
+                f"{inputs[0]}: got frames {frame_list(clip.numbers)}, but a truth shows one frame; "
+                "`frames` selects it"
             )
         here = clip.source(clip.numbers[0])
         frame = clip.with_neighbours(here, extent=EVERYWHERE, reach=2)
     else:
-        raise InputError(f"inputs must be a pattern, one file or three, got {len(inputs)}")
+        raise InputError(f"`inputs` must be a pattern, one file or three, got {len(inputs)}")
     pictures = {k: _read(path) for k, path in peers.items()}
     truths = [_read(path) for path in truth]
     if len(truths) == 1:

@@ -37,7 +37,7 @@ class Laboratory:
 
     def __init__(self, device: wgpu.GPUDevice, *, rounds: int = 3, tell: Tell | None = None):
         if rounds < 1:
-            raise InputError(f"rounds must be 1 or more, got {rounds}")
+            raise InputError(f"`rounds` must be 1 or more, got {rounds}")
         self.device, self.rounds, self.tell = device, rounds, tell or (lambda text: None)
         self._images, self.clock = TexturePool(device), timing.clock(device)
 

@@ -25,9 +25,9 @@ _SIDE = 16  # px, of its tiles
 def flow_settings(text: str, device: wgpu.GPUDevice) -> dict[str, Any]:
     """Settings of a source of motion, written NAME[:QUALITY]; InputError if there is none such."""
     flow, _, quality = text.partition(":")
-    check_choice("flow", flow, get_args(FlowName))
+    check_choice("`flow`", flow, get_args(FlowName))
     if quality:
-        check_choice("flow_quality", quality, get_args(FlowQuality))
+        check_choice("`flow_quality`", quality, get_args(FlowQuality))
     settings: dict[str, Any] = {"flow": flow, "flow_quality": quality or "best"}
     recipe_of(**dict(zip(("flow", "quality"), settings.values(), strict=True)), device=device)
     return settings

@@ -38,7 +38,7 @@ RESERVED = frozenset(_RESERVED.split())
 def check_contract(method: object) -> None:
     """InputError unless `method` is a class that keeps the contract of contract.Method."""
     if not inspect.isclass(method):
-        raise InputError(f"a method is a class, got {method!r}")
+        raise InputError(f"a method must be a class, got {method!r}")
     with_name = f"the method {method.__name__}"
     name = getattr(method, "name", None)
     if not isinstance(name, str) or not re.fullmatch(r"[a-z][a-z0-9_]*", name):
@@ -50,7 +50,7 @@ def check_contract(method: object) -> None:
     spread = getattr(method, "spread", "along")
     if spread not in get_args(Spread):
         known = ", ".join(get_args(Spread))
-        raise InputError(f"{with_name}: spread is one of {known}, got {spread!r}")
+        raise InputError(f"{with_name}: spread must be one of {known}, got {spread!r}")
     _check_calls(with_name, method)
     _check_options(with_name, getattr(method, "Options", None))
 
@@ -95,4 +95,6 @@ def _check_options(with_name: str, options: Any) -> None:
         if option.kind is str and not option.choices:
             raise InputError(f"{with_name}: option {name} is a text, which needs a Literal")
         if option.kind is bool and option.default is not False:
-            raise InputError(f"{with_name}: option {name} is on by default; a switch is off")
+            raise InputError(
+                f"{with_name}: option {name} is on by default; a switch must be off by default"
+            )

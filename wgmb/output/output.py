@@ -345,11 +345,11 @@ def check_uses(
     pattern: str | Path, *, bits: int, layers: str, compression: str, window: str
 ) -> None:
     """InputError for an option that is wrong, or has no use for this kind of output."""
-    check_choice("layers", layers, ("all", "picture"))
-    check_choice("window", window, WINDOWS)
+    check_choice("`layers`", layers, ("all", "picture"))
+    check_choice("`window`", window, WINDOWS)
     exr.check_compression(compression)
     if bits not in (8, 16):
-        raise InputError(f"bits must be 8 or 16, got {bits}")
+        raise InputError(f"`bits` must be 8 or 16, got {bits}")
     suffix = Path(pattern).suffix.lower()
     if bits == 16 and suffix not in DEEP:
         raise InputError(f"`bits` 16 needs a .png or .tif output, got {pattern}")

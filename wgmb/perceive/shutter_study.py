@@ -23,9 +23,9 @@ def difference(shutter: Shutter, speed: float, fps: float, cone: Cone | None = N
     over the ring that the disk sweeps, at four times within a frame.
     """
     if not (math.isfinite(speed) and speed > 0):
-        raise InputError(f"speed must be over 0 rad/s, got {speed}")
+        raise InputError(f"`speed` must be over 0 rad/s, got {speed}")
     if not (math.isfinite(fps) and fps > 0):
-        raise InputError(f"fps must be over 0, got {fps}")
+        raise InputError(f"`fps` must be over 0, got {fps}")
     cone = cone or Cone()
     r = (0.1 + 0.2 * (np.arange(40) + 0.5) / 40)[:, None]
     theta = (np.arange(720) + 0.5) / 720 * TURN

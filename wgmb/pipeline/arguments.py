@@ -48,9 +48,9 @@ def checked(
         samples = getattr(method, "samples", SAMPLES)
     samples = AUTO_SAMPLES if samples == "auto" else samples
     if not isinstance(samples, (int, np.integer)) or not 1 <= samples <= MOST_SAMPLES:
-        raise InputError(f"samples must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
+        raise InputError(f"`samples` must be 1 to {MOST_SAMPLES} or auto, got {samples!r}")
     if not 0 <= jitter <= 1:
-        raise InputError(f"jitter must be 0 to 1, got {jitter}")
+        raise InputError(f"`jitter` must be 0 to 1, got {jitter}")
     if max_blur is not None and not max_blur >= 0:
         raise InputError(f"`max_blur` must be 0 or more pixels, got {max_blur}")
     check_choice("output", output, OUTPUTS)
@@ -92,5 +92,5 @@ def shutter_of(shutter: Shutter | float, curve: str | Weight | None = None) -> S
     try:
         degrees = shutter if isinstance(shutter, str) else float(shutter)  # Shutter refuses text
     except (TypeError, ValueError):
-        raise InputError(f"shutter must be degrees or a Shutter, got {shutter!r}") from None
+        raise InputError(f"`shutter` must be degrees or a Shutter, got {shutter!r}") from None
     return Shutter(degrees) if curve is None else Shutter(degrees, curve=curve)

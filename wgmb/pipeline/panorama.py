@@ -102,7 +102,9 @@ def _room(frames: Mapping[int, Frame], extent: Extent) -> int:
     """Columns beyond either edge for content that leaves the frames: at most half the width."""
     width, height = frames[0].size
     if frames[0].window not in (None, (0, 0, width, height)):
-        raise InputError("`wrap='on'` needs the whole panorama, and the frame's window is a part")
+        raise InputError(
+            "`wrap='on'` needs the whole panorama, but the frame's window is only a part of it"
+        )
     if extent.spread == "everywhere":
         return 0
     boxes = [extent.box(shortest(frame), offset) for offset, frame in frames.items()]

@@ -327,7 +327,7 @@ def _of_cuts(cuts: str | None, clip: Clip) -> str:
 def _of_scale(scale: str) -> str:
     if "=" not in scale or with_amount(scale)[1] is not None or is_file(scale):
         return ""
-    return f"`scale` {scale}: no amount such as {scale}:0.5, so all else stands still"
+    return f"`scale` {scale} has no amount such as {scale}:0.5, so everything else stands still"
 
 
 def _of_conversion(conversion: RateConversion, clip: Clip, output: OutputSettings) -> str:

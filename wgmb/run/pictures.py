@@ -275,7 +275,7 @@ def _rate(name: str, rate: str | float | Fraction) -> Fraction:
 def _held(holdout: np.ndarray | str | None) -> Holdout:
     if holdout is None or isinstance(holdout, str):
         if holdout not in (None, NONE):
-            raise InputError(f"holdout must be an array or {NONE!r}, got {holdout!r}")
+            raise InputError(f"`holdout` must be an array or {NONE!r}, got {holdout!r}")
         return Holdout(displays=holdout is None)
     return Holdout(_matte(holdout), displays=False)
 
@@ -283,7 +283,7 @@ def _held(holdout: np.ndarray | str | None) -> Holdout:
 def _matte(holdout: np.ndarray) -> np.ndarray:
     found = np.asarray(holdout)
     if found.ndim != 2:
-        raise InputError(f"holdout must be (height, width), got {found.shape}")
+        raise InputError(f"`holdout` must be (height, width), got {found.shape}")
     _check_size("holdout", found)
     return np.asarray(found, np.float32)
 

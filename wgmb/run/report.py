@@ -26,9 +26,7 @@ class Failure(str):
         return made
 
 
-UNFOLLOWED = (
-    "something moves too far to be followed, or is there in one picture alone: it stays sharp"
-)
+UNFOLLOWED = "something moves too far to be followed, or is in one picture only: it stays sharp"
 """Remark on pictures with a place whose motion was not found."""
 MOST_ROWS = 20  # of a report in a notebook, of a kind
 

@@ -56,7 +56,7 @@ class BlurRequest(SettingsGroups):
             return RateConversion(self.output.rate, self.output.rate) if self.averages else None
         if self.output.fps is None:
             raise InputError("`fps_in` needs `fps`, the rate of the output, such as 60")
-        return RateConversion(rate_of(self.fps_in, "`fps_in`"), self.output.rate)
+        return RateConversion(rate_of(self.fps_in, "fps_in"), self.output.rate)
 
     def opened(self, settled: SequenceFindings | None = None) -> tuple[Clip, Display | None]:
         """The Clip, and how it is shown."""

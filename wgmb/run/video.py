@@ -136,7 +136,7 @@ class VideoRun:
         if not is_installed("cv2"):
             return f"without a GPU, OpenCV finds motion much sooner: {install_command('flow')}"
         better = "`flow=search` is better in some videos, but takes much longer"
-        return f"no GPU, so motion is found quickly: {better}"
+        return f"there is no GPU, so motion is found by a quick search; {better}"
 
     @property
     def quicker(self) -> str:
@@ -406,7 +406,7 @@ def request_of(
         raise InputError(f"unknown setting {unknown[0]!r}{near}")
     for name, kind in hints.items():
         if name in keywords and get_origin(kind) is Literal and name not in _CHECKED:
-            check_choice(name, keywords[name], get_args(kind))
+            check_choice(f"`{name}`", keywords[name], get_args(kind))
         if name in keywords and name in _TIMES and not isinstance(keywords[name], str):
             keywords[name] = f"{keywords[name]:.9f}"
         elif name in keywords and name in _AS_TEXT:

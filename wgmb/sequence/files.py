@@ -147,8 +147,8 @@ class SequenceFiles:
         apart = {b - a for a, b in pairwise(self.on_disk)}
         if len(apart) == 1 and (step := apart.pop()) > 1:
             text = (
-                f"frames are {step} apart: the shutter and the vectors count intervals of one "
-                f"frame, so that {180 * step} degrees are half of the time between these"
+                f"frames are {step} apart, but the shutter and the vectors count intervals of one "
+                f"frame: {180 * step} degrees expose half of the time between two of these frames"
             )
             return {text: list(numbers)}
         around = {n: [m for m in (n - 1, n + 1) if first <= m <= last] for n in numbers}

@@ -152,7 +152,7 @@ def _left_out(picture: _Sequence, others: list[_Sequence], needed: dict[str, boo
     for kind in (kind for kind, is_needed in needed.items() if is_needed):
         for one in [s for s in others if kinds[kind](s)][:1]:
             own, wanted = (numbered(sorted(s.numbers)) for s in (one, picture))
-            text += f"; {kind} {one} left out, as they are {own}, and the picture is {wanted}"
+            text += f"; {kind} {one} left out, as it holds {own}, and the picture holds {wanted}"
     return text
 
 

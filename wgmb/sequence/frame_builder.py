@@ -105,8 +105,8 @@ class FrameBuilder:
         both = {name for pair in sides.values() for name in pair} & set(source.color)
         if both:
             raise InputError(
-                f"the vectors would be {', '.join(sorted(both))} of the picture itself; "
-                "`vector_layer` names another layer, `also` adds that of another file"
+                f"{', '.join(sorted(both))} of the picture itself would be read as vectors; "
+                "`vector_layer` names another layer, and `also` adds one of another file"
             )
 
     def _alone(self, source: FrameFile) -> Found:

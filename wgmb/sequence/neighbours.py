@@ -56,7 +56,7 @@ class Neighbours:
     """
 
     def __init__(self, stored: FrameCache, builder: FrameBuilder, is_search: bool):
-        check_choice("outside", stored.passes.outside, OUTSIDE)
+        check_choice("`outside`", stored.passes.outside, OUTSIDE)
         check_choice("`wrap`", stored.passes.wrap, panorama_signs.WRAPS)
         check_choice("`twos`", stored.passes.twos, TWOS)
         self._stored, self._builder, self._is_search = stored, builder, is_search
@@ -321,7 +321,9 @@ class Neighbours:
         wrap = self._stored.passes.wrap
         is_whole = source.data_window == source.display_window
         if wrap == "on" and not is_whole:
-            raise InputError("wrap 'on' needs the whole panorama, and its data window is a part")
+            raise InputError(
+                "`wrap='on'` needs the whole panorama, but the data window is only a part of it"
+            )
         if wrap == "off" or not is_whole or (wrap == "auto" and frame.camera is not None):
             return False
         if wrap == "on":

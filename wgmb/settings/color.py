@@ -69,8 +69,8 @@ class ColorSettings(DisplaySettings):
         """
         if self.from_ and re.fullmatch(r"[\d:.]+", self.from_):
             raise InputError(
-                f"`from_` is a colour space, got {self.from_}; a part of a video is `begin` "
-                "and `end`"
+                f"`from_` names a colour space, got {self.from_}; `begin` and `end` select a part "
+                "of a video"
             )
         used = [f"`{name}`" for name, value in vars(self).items() if value is not None]
         if not used:

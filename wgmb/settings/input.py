@@ -24,7 +24,7 @@ class InputSettings:
     frames: str | None = None
     "Frame numbers, such as 1-100x2 or 1,3,5-8; by default all existing frames."
     program: ProgramName | None = None
-    "Program that made the frames: sets the options that they need, where they are not given."
+    "Program that made the frames; it sets the options that are not given, as its frames need them."
     layer: str | None = None
     "Colour layer, if it cannot be found by name."
     vectors: str = "auto"
@@ -62,7 +62,7 @@ class InputSettings:
     wrap: Literal["auto", "on", "off"] = "auto"
     "Panoramas of 360 degrees: motion and blur go on around the left and right edge."
     twos: Literal["auto", "off"] = "auto"
-    "Animation on twos: jumps between poses that are held are not blurred; off: they are."
+    "Animation on twos: auto does not blur jumps between held poses; off blurs them."
     cuts: str | None = None
     """Frames that begin a shot: 101,155, cut.edl[@FPS] or cut.otio; only:101,155 switches the
     detection off; none: no cuts.
@@ -100,7 +100,9 @@ class InputSettings:
             return ""
         told = [f"`{name}={value}`" for name, value in self._set_by_program.items()]
         name = PROGRAMS[self.program].name
-        return f"frames of {name}: {', '.join(told) or 'every option of it is given otherwise'}"
+        return (
+            f"frames of {name}: {', '.join(told) or 'all options that it sets have other values'}"
+        )
 
     def open(
         self,

@@ -94,7 +94,7 @@ def rate_of(text: str, name: str = "fps") -> Fraction:
             raise ValueError
         fps = Fraction(text)
     except (ValueError, ZeroDivisionError):
-        raise InputError(f"{name} must be a number or a fraction, got {text!r}") from None
+        raise InputError(f"`{name}` must be a number or a fraction, got {text!r}") from None
     if not Fraction(1, 1000) <= fps <= 1000:
-        raise InputError(f"{name} must be 0.001 to 1000, got {text}")
+        raise InputError(f"`{name}` must be 0.001 to 1000, got {text}")
     return fps

@@ -61,10 +61,11 @@ def _search(quality: FlowQuality, device: wgpu.GPUDevice) -> MotionSource:
 GPU, OPENCV, ALONE = "auto on a GPU", "auto with OpenCV", "auto with neither"
 RECIPES = {
     GPU: Recipe("auto", None, "gather", True,
-                "dense inverse search on the GPU, and in blocks where something is fast", _on_gpu),
+                "dense inverse search on the GPU, and in blocks where something moves fast",
+                _on_gpu),
     OPENCV: Recipe("dis", "fast", "tap", True,
                    "dense inverse search (fast, because there is no GPU); finer, and searched in "
-                   "blocks, where something is fast", lambda *_: by_place()),
+                   "blocks, where something moves fast", lambda *_: by_place()),
     ALONE: Recipe("search", "draft", "gather", False,
                   "search (draft, because there is no GPU)", _search),
     "search": Recipe("search", None, "gather", False, "search", _search),

@@ -54,7 +54,7 @@ def size_of(text: str) -> tuple[int, int]:
     """`1920x1080` -> width, height."""
     sides = re.fullmatch(r"0*([1-9][0-9]{0,8})x0*([1-9][0-9]{0,8})", text)
     if sides is None:
-        raise InputError(f"size must be like 1920x1080, got {text!r}")
+        raise InputError(f"`size` must be like 1920x1080, got {text!r}")
     return int(sides[1]), int(sides[2])
 
 

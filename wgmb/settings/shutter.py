@@ -100,8 +100,8 @@ class ShutterSettings:
         if isinstance(angle, str) or angle is None or not 0 < angle < _FEW_DEGREES:
             return ""
         return (
-            f"`shutter` {angle:g} means degrees, which hardly blur; Blender's {angle:g} is "
-            f"{360 * angle:g}"
+            f"`shutter` {angle:g} is in degrees, and hardly blurs; Blender's {angle:g} is "
+            f"{360 * angle:g} degrees"
         )
 
     def curve_read(self) -> str | None:
@@ -123,10 +123,10 @@ class ShutterSettings:
             try:
                 phase = float(phase)
             except ValueError:
-                check_choice("phase", phase, ("start", "centre", "end"), " or a number")
+                check_choice("`phase`", phase, ("start", "centre", "end"), " or a number")
         curve = self.curve or "box"
         if curve not in CURVES:
             if not readable(Path(curve)):
-                check_choice("curve", curve, CURVES, " or a CSV file")
+                check_choice("`curve`", curve, CURVES, " or a CSV file")
             curve = read_curve(curve)
         return Shutter(angle, phase, curve, self.rolling, self.rolling_duration)

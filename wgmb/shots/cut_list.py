@@ -67,7 +67,8 @@ class CutList:
         if not self._plain:
             if self.text not in ("", _NONE):
                 raise InputError(
-                    f"cuts {self.text!r}: must name cuts, such as only:101,155; none: no cuts"
+                    f"`cuts` {self.text!r} must name cuts, such as only:101,155; "
+                    "`cuts=none` means no cuts"
                 )
             return frozenset()
         found = _FILE.fullmatch(self._plain)

@@ -60,8 +60,8 @@ class Holdout:
             return ""
         share = 100 * sum(self.shares.values()) / len(self.shares)
         return (
-            f"what stands before moving ground stays sharp, such as displays: {share:.1f} % of "
-            f"{counted(len(self.shares), 'picture')}; `holdout` none blurs all"
+            f"static areas before a moving background, such as displays, stay sharp: "
+            f"{share:.1f} % of {counted(len(self.shares), 'picture')}; `holdout` none blurs all"
         )
 
 

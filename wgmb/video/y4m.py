@@ -176,7 +176,8 @@ def lost_in(size: tuple[int, int], coding: Coding, facts: Facts) -> list[str]:
     taken, _ = _assumed(held, size, None)
     if any(a != b for a, b in zip(_for_players(taken), _for_players(held), strict=True)):
         said.append(
-            "YUV4MPEG2 states no colours, and players assume others; `codec='ffv1'` states them"
+            "YUV4MPEG2 does not state colours, so players may show wrong ones; "
+            "`codec='ffv1'` states them"
         )
     if facts.mastering or facts.light_level:
         said.append("YUV4MPEG2 keeps no HDR10 data (mastering display, light level)")

@@ -284,9 +284,9 @@ def _take_frames(call: BlurCall) -> int:
     return blur_on_farm(job, call.crew, call.console, call.adapter)
 
 
-_ALONE = "a pipe stands alone: one input, and no --confidence, --try or --workers"
-_FOR_PIPES = "--color-in is for pipes; files state their colours, or are assumed to"
-_TRIED = "--try is for videos; of frames, --frames selects some"
+_ALONE = "a pipe must be the only input, without --confidence, --try, --workers or --cluster"
+_FOR_PIPES = "--color-in is for pipes; the colours of files are read from the files"
+_TRIED = "--try is for videos; --frames selects some of the rendered frames"
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ class CompareSettings:
         if self.budget is None:
             return None
         if not self.budget > 0:
-            raise InputError(f"budget must be over 0 ms, got {self.budget}")
+            raise InputError(f"--budget must be over 0 ms, got {self.budget}")
         seconds = self.budget / 1e3
         return lambda report, case: [seconds]
 
@@ -85,7 +85,7 @@ class CompareSettings:
         try:
             degrees = [float(d) for d in (self.shutters or str(settled.shutter)).split(",")]
         except ValueError:
-            raise InputError(f"shutters must be like 90,180, got {self.shutters!r}") from None
+            raise InputError(f"--shutters must be like 90,180, got {self.shutters!r}") from None
         return {f"{d:g}°": replace(settled, shutter=d).make() for d in degrees}
 
 

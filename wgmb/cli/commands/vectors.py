@@ -27,7 +27,8 @@ def vectors(
     form: Annotated[
         str | None,
         Parameter(
-            name="--as", help=f"Form of the vectors: {', '.join(FORMS)}; of a .flo it is flo."
+            name="--as",
+            help=f"Form of the vectors: {', '.join(FORMS)}; default: flo for .flo files.",
         ),
     ] = None,
     max_displace: float | None = None,
@@ -90,5 +91,7 @@ def vectors(
         console.say(f"frame {number}: clipped {counted(count, 'pixel')} beyond --max-displace")
     if len(clip.chosen) > 1 and not files.takes_views:
         view = clip.chosen[0]
-        console.say(f"wrote only view {view}; %V in the output's name makes a file for each")
+        console.say(
+            f"only view {view} was written; %V in the output's name makes a file for each view"
+        )
     return console.conclude(report, files.pattern, f"{time.perf_counter() - started:.1f} s")

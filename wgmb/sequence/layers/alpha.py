@@ -11,7 +11,7 @@ import numpy as np
 ALPHAS = ("premultiplied", "straight")
 _MOST = 0.5  # share of the pixels of alpha 0 that have colour, from which on it seems straight
 _STRAIGHT = (
-    "over half of the pixels of alpha 0 have colour: if it is straight, not premultiplied, "
+    "over half of the pixels of alpha 0 have colour: if the alpha is straight, not premultiplied, "
     "`alpha='straight'` reads it so"
 )
 _NONE = "alpha is 0 everywhere, though there is light: other images than EXR are written without it"

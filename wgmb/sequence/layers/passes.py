@@ -76,4 +76,4 @@ class Passes:
             if getattr(self, name) and self.camera is None:
                 raise InputError(f"`{name}` needs `camera`, a file with the cameras of the frames")
         if not self.far > 0:
-            raise InputError(f"far must be over 0, got {self.far}")
+            raise InputError(f"`far` must be over 0, got {self.far}")

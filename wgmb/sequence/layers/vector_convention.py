@@ -84,7 +84,7 @@ class ConventionFinder:
         told, own = self._wanted, tested.vectors
         if told.is_told or (own and replace(own, scale=told.scale) == told):
             return tested
-        text = f"{told}, of an unknown unit: `vector_scale` is twice the longest motion"
+        text = f"{told}, whose unit is unknown: `vector_scale` must be twice the longest motion"
         return vector_test.ConventionFinding(told, False, text, notable=True)
 
     @staticmethod
@@ -212,8 +212,8 @@ class ConventionFinder:
         if not total.is_reversed:
             return "planar"
         text = (
-            f"larger depth is nearer, as what covers what shows in {total.farther} of "
-            f"{total.count} places; `depth_kind=planar` reads it otherwise"
+            f"larger depth is taken as nearer, as surfaces of larger depth cover others in "
+            f"{total.farther} of {total.count} places; `depth_kind=planar` takes it as farther"
         )
         self._stored.notes[text] = list(self._stored.numbers)
         return "white-near"

@@ -103,8 +103,8 @@ class Evidence:
             return ""
         if vectors.middle:
             return (
-                "they are all below a pixel, and nothing tells their unit: `vector_scale` is twice "
-                "the longest motion in pixels"
+                "they are all below a pixel, and their unit is unknown: `vector_scale` must be "
+                "twice the longest motion in pixels"
             )
         width, height = self.whole
         return (
@@ -234,9 +234,9 @@ def decide(
         text = f"{vectors}, tested: {text}"
         return ConventionFinding(vectors, True, text, left=left / still)
     meant = best.of(vectors)
-    why = f"{left / still:.0%} of the difference to the next frame is left along them"
     text = (
-        f"{meant}{_unit(best, tested[0])}, because {why}, and {stated / still:.0%} with {vectors}"
+        f"{meant}{_unit(best, tested[0])}, because moved along them, the next frame matches "
+        f"({left / still:.0%} of the difference left; {stated / still:.0%} with {vectors})"
         f"{_unknown(best, meant, tested[0])}"
     )
     return ConventionFinding(meant, True, text, notable=True, left=left / still)
@@ -250,7 +250,7 @@ def _untested(
     units = [e.unit_lacking(vectors) for e in moving]
     lacking = [units[0]] if units and all(units) else []
     if moving and not is_named and not vectors.flip:
-        lacking.append("y is taken to point down: `vector_flip=y` takes it as up")
+        lacking.append("y is taken to point down; `vector_flip=y` makes it point up")
     text = "; ".join([f"{vectors}, by name ({doubt})", *lacking])
     return ConventionFinding(vectors, False, text, notable=bool(lacking))
 

@@ -84,7 +84,7 @@ class Vectors:
     turned: bool = False
 
     def __post_init__(self) -> None:
-        check_choice("vectors", self.convention, ("auto", *CONVENTIONS, "none"))
+        check_choice("`vectors`", self.convention, ("auto", *CONVENTIONS, "none"))
         if self.flip not in ("", "x", "y", "xy"):
             raise InputError(f"vector flip must be x, y or xy, got {self.flip!r}")
         if not np.isfinite(self.scales).all() or not np.isfinite(self.offset or 0.0):

@@ -149,8 +149,8 @@ class VideoReader:
         if not (width and height):  # FFmpeg forgets sizes over its limit
             most = limits.most_pixels(stored, limits.AVERAGED, self._max_mb)
             raise InputError(
-                f"{self.path}: no size of its pictures can be read: it is cut off, or they have "
-                f"over {most:,} pixels, which a file of {stored:,} bytes may not ask for; "
+                f"{self.path}: the size of its pictures cannot be read: the file is cut off, or "
+                f"they have over {most:,} pixels, too many for a file of {stored:,} bytes; "
                 f"`max_mb={2 * self._max_mb:g}` allows twice as many"
             )
         if not 0 < min(width, height) <= max(width, height) <= limits.MOST_PIXELS_A_SIDE:
@@ -219,9 +219,10 @@ class VideoReader:
                 f"{many} {have} the time of another, the first at {at:.2f} s: left out"
             )
         if slowed := self._packets.slowed:
+            are = "is" if slowed == 1 else "are"
             self.notes.append(
-                f"{counted(slowed, 'picture')} with a delay under 0.02 s: shown for 0.1 s, as "
-                "browsers show it"
+                f"{counted(slowed, 'picture')} with a delay under 0.02 s {are} shown for 0.1 s, as "
+                "in browsers"
             )
         if self._packets.is_assumed:
             self.notes.append(f"does not say when its pictures are shown: {float(self.rate):g} a "
@@ -234,7 +235,7 @@ class VideoReader:
             self.notes.append("Dolby Vision data is not used: pictures are those of its base layer")
         self.notes += [f"{text} not kept" for kind, text in _NOT_KEPT.items() if kind in side]
         if self._turn.odd:
-            self.notes.append("is turned by other than a multiple of 90 degrees, which is left out")
+            self.notes.append("its rotation is no multiple of 90 degrees, and is left out")
         if self._packets.lacks:
             end, whole = (float(self._packets.end + more) for more in (0, self._packets.lacks))
             self.notes.append(f"is cut off: it ends at {end:.2f} s of {whole:.2f} s")

@@ -289,7 +289,8 @@ def chosen(
         codec = _DEFAULTS[suffix]
     if codec not in CODECS:
         raise InputError(
-            f"codec must be one of {', '.join(CODECS)}, got {codec!r}{did_you_mean(codec, CODECS)}"
+            f"`codec` must be one of {', '.join(CODECS)}, got {codec!r}"
+            f"{did_you_mean(codec, CODECS)}"
         )
     found = CODECS[codec]
     if suffix not in found.suffixes:
@@ -322,7 +323,7 @@ def _encoder(codec: str, kind: str | None) -> Encoder:
         encoder = found.software
     elif kind not in HARDWARE:
         raise InputError(
-            f"encoder must be one of {', '.join(HARDWARE)}, got {kind!r}"
+            f"`encoder` must be one of {', '.join(HARDWARE)}, got {kind!r}"
             f"{did_you_mean(kind, HARDWARE)}"
         )
     elif kind not in dict(found.hardware):

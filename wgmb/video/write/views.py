@@ -73,7 +73,7 @@ def left_out(facts: Facts, suffix: str) -> list[str]:
         said.append("its projection (360 degrees) is not kept (.mkv and .mp4 hold most)")
     held = mode and (is_mkv or (suffix == ".mp4" and mode in _IN_MP4))
     if _has_two_views(facts) and not held:
-        said.append(f"that it has two views ({_arrangement(facts)}) is not kept (.mkv holds most)")
+        said.append(f"its stereo layout ({_arrangement(facts)}) is not kept (.mkv holds most)")
     return said
 
 
