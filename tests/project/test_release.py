@@ -210,3 +210,14 @@ def test_an_entry_of_the_changelog_is_one_short_line():
     text = (ROOT / "CHANGELOG.md").read_text("utf-8")
     assert [line for line in text.splitlines() if len(line) > 160] == []
     assert not re.search(r"\bdB\b|FLIP", text), "scores stand on the pages of the laboratory"
+
+
+def test_pinned_versions_are_compared_with_advisories_every_night():
+    """All files that pin versions, so that SECURITY.md is true."""
+    nightly = (ROOT / ".github/workflows/nightly.yml").read_text("utf-8")
+    assert re.search(r"schedule:\n    - cron: \"\d+ \d+ \* \* \*\"", nightly)
+    compared = re.findall(r"pip-audit --requirement (\S+)", nightly)
+    assert compared == ["constraints.txt", "tests/blender/needs.txt"]
+    wheels = re.findall(r"^([\w.-]+==\S+)", (ROOT / "blender/wheels.txt").read_text("utf-8"), re.M)
+    pinned = (ROOT / "constraints.txt").read_text("utf-8")
+    assert wheels and all(f"\n{wheel} " in f"\n{pinned}" for wheel in wheels)

@@ -367,6 +367,15 @@ def with_sidecar(folder, file="m.json", text=None):
     return make.write_exr(folder / "a.exr", make.frame(1, "plain") | planes(), attributes)
 
 
+def test_a_manifest_beside_the_file_has_at_most_16_mib(tmp_path):
+    text = json.dumps({"tree": f"{TREE:08x}"}).encode()
+    path = with_sidecar(tmp_path, text=text.ljust(16 << 20))
+    assert frame(path, 0, holdout="CryptoObject=t*").holdout is not None
+    path = with_sidecar(tmp_path, text=text.ljust((16 << 20) + 1))
+    with pytest.raises(InputError, match=r"m\.json: over 16 MiB"):
+        frame(path, 0, holdout="CryptoObject=t*")
+
+
 def test_a_manifest_beside_the_file_is_read(tmp_path):
     text = json.dumps({"tree": f"{TREE:08x}"}).encode()
     path = with_sidecar(tmp_path, text=text)
