@@ -368,6 +368,26 @@ def test_an_exposure_is_dropped_before_its_next_picture_and_leaves_nothing_behin
 TIMES = [Fraction(n, 48) for n in (0, 1, 2, 4, 5, 7, 8, 9, 12, 13, 14, 16, 17, 18)]
 
 
+def test_the_line_tells_of_the_frame_on_the_canvas(clip, monkeypatch):
+    """While it played, it told of a frame that was drawn already, but not composed."""
+    viewer, told = opened(clip, flow="none", frame=2.0), []
+    monkeypatch.setattr(
+        viewer.panel, "draw", lambda state, info, *place: told.append(info.frame) or state
+    )
+    settled(viewer)
+    assert told[-1] == "output frame 2, 0.042 s: picture 2"
+    monkeypatch.setattr(viewer.screen, "show", lambda view: None)  # composing takes long
+    viewer.state = put(viewer.state, frame=5.0)
+    settled(viewer)
+    assert told[-1].startswith("output frame 2, ")
+    monkeypatch.undo()
+    monkeypatch.setattr(
+        viewer.panel, "draw", lambda state, info, *place: told.append(info.frame) or state
+    )
+    settled(viewer)
+    assert told[-1].startswith("output frame 5, ")
+
+
 @pytest.mark.covers(0)
 @pytest.mark.parametrize("speed", ["0.4", "1"])
 @pytest.mark.parametrize("own_times", [False, True])

@@ -17,10 +17,10 @@ from wgmb.video.read.reader import VideoReader
 from wgmb.video.read.timeline import Times
 from wgmb.viewer import State, controls
 from wgmb.viewer.draw.perception import seen_frames
-from wgmb.viewer.panel.panel import made_of
 from wgmb.viewer.panel.sections import at_pace, in_part
 from wgmb.viewer.panel.widgets import shortened
 from wgmb.viewer.state.state import video_time
+from wgmb.viewer.state.video_time import described
 from wgmb.viewer.subjects.video_exposure import exposure_of, picture_at
 from wgmb.viewer.subjects.video_motion import PictureFinding
 
@@ -103,8 +103,8 @@ def test_playing_begins_anew_after_the_last_output_frame(state):
 
 def test_the_panel_says_which_output_frame_it_is_and_what_it_is_made_of(state):
     slow = put(at_pace(state, "0.5"), frame=9.0)
-    assert made_of(slow, (4, 5)) == "output frame 9, 0.375 s: pictures 4 - 5"
-    assert made_of(slow, (4,)) == "output frame 9, 0.375 s: picture 4"
+    assert described(slow, (4, 5)) == "output frame 9, 0.375 s: pictures 4 - 5"
+    assert described(slow, (4,)) == "output frame 9, 0.375 s: picture 4"
 
 
 @pytest.mark.parametrize("fps", [None, Fraction(30), Fraction(24000, 1001)])

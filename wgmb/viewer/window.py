@@ -400,11 +400,13 @@ class Viewer:
             overlay.tag(f"opening {self.state.source} ...", 16, 16)
             return
         size, area = self.canvas.get_logical_size(), self._area()
-        if self.screen.painted is not None:
-            overlay.describe(self.screen.painted, area)
+        info, painted = self._info, self.screen.painted
+        if painted is not None:
+            overlay.describe(painted, area)
+            info = replace(info, frame=painted.report.frame)
         if self.state.inspect or self.state.arrows:
             self._inspect(self._drawn)
-        self.state = self.panel.draw(self.state, self._info, size, area)
+        self.state = self.panel.draw(self.state, info, size, area)
 
     def _inspect(self, drawn: Drawn) -> None:
         """Draw arrows, and the numbers under the mouse."""

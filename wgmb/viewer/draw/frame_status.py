@@ -27,6 +27,6 @@ class FrameStatus:
     reference: tuple[int, int] = (0, 1)  # samples done, of how many
     measured: Measured | None = None
     waiting: str = ""  # what is shown meanwhile, and what for
-    made_of: tuple[int, ...] = ()  # pictures that share the exposure of a video's output frame
+    frame: str = ""  # of a video: its output frame, and the pictures that share the exposure
     busy: bool = False
     changed: bool = False

@@ -174,7 +174,7 @@ class Renderer:
         detail.is_complete = done
         report.busy = moving or not done or detail.level > 0 or detail.is_preview or lacks
         if isinstance(subject, VideoSubject):
-            report.made_of = subject.made_of(state, state.shutter.make())
+            report.frame = subject.frame_of(state)
         if names[-1][0] == REFERENCE:
             report.reference = last.done, last.total
             report.measured = measured = self._measure(first, last)

@@ -20,6 +20,8 @@ class Info:
     frame_times: np.ndarray  # seconds, the last one last
     draw_times: np.ndarray
     passes: dict[str, float] = field(default_factory=dict)
+    frame: str = ""
+    """The output frame of a video that is on the canvas, in words; the state may be ahead of it."""
     recording: str = ""
     export: str = ""
     message: str = ""

@@ -10,7 +10,6 @@ from imgui_bundle import imgui
 
 from ..controls import Box
 from ..state.state import State
-from ..state.video_time import output, output_frame
 from ..state.words import for_shell
 from . import overlay, sections
 from .info import Info
@@ -107,7 +106,7 @@ class Panel:
         state = replace(state, frame=float(frame), playing=False) if changed else state
         self._bar(state, info)
         if state.is_video:
-            self._ui.dim(made_of(state, info.report.made_of))
+            self._ui.dim(info.frame)
         return state
 
     def _bar(self, state: State, info: Info) -> None:
@@ -164,15 +163,3 @@ def commands(state: State, output: str) -> str:
         named = str(other.with_stem(f"{other.stem}-b"))
         lines.append(for_shell(state.as_kept.command(named)))
     return "\n".join(lines)
-
-
-def made_of(state: State, pictures: tuple[int, ...]) -> str:
-    """The output frame of a video on display, and the pictures that contribute to it."""
-    now = output_frame(state)
-    since = float(now.time - output(state).frames[0].time)
-    text = f"output frame {now.number}, {since:.3f} s"
-    if not pictures:  # nothing of the video has been drawn yet
-        return text
-    numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))
-    word = "pictures" if len(pictures) > 1 else "picture"
-    return f"{text}: {word} {numbers}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -156,3 +156,12 @@ def passed(state: ShownMoment, seconds: float) -> float:
             return frame + seconds / step
         frame, seconds = float(number + 1), seconds - left
     return frame + seconds * frames
+
+
+def described(state: ShownMoment, pictures: Sequence[int]) -> str:
+    """The output frame that is shown, and the numbers of the pictures that share its exposure."""
+    frame = output_frame(state)
+    since = float(frame.time - output(state).frames[0].time)
+    numbers = " - ".join(str(n) for n in dict.fromkeys((min(pictures), max(pictures))))
+    word = "pictures" if len(pictures) > 1 else "picture"
+    return f"output frame {frame.number}, {since:.3f} s: {word} {numbers}"

@@ -31,7 +31,7 @@ from ...video.read.reader import VideoReader
 from ..state.allowed import check_video
 from ..state.files import reader_of
 from ..state.state import State
-from ..state.video_time import output, output_frame
+from ..state.video_time import described, output, output_frame
 from .motion_thread import MotionThread
 from .video_exposure import Knowledge, VideoExposure, exposure_of, reach
 from .video_motion import MotionRequest, PictureFinding
@@ -154,9 +154,10 @@ class VideoSubject:
         sharp = "sharp: " if here in self._lacking else ""
         return f"{sharp}finding {what} of picture {number}{since}"
 
-    def made_of(self, state: State, shutter: Shutter) -> tuple[int, ...]:
-        """Numbers of the pictures that share the exposure of the present output frame."""
-        return tuple(cell.index for cell in self._exposure(state, shutter).cells)
+    def frame_of(self, state: State) -> str:
+        """The output frame of `state`, and the pictures that share its exposure, in words."""
+        exposure = self._exposure(state, state.shutter.make())
+        return described(state, [cell.index for cell in exposure.cells])
 
     @property
     def draft(self) -> str:
