@@ -22,8 +22,8 @@ done = bpy.ops.extensions.package_install_files(
     filepath=sys.argv[1], repo="user_default", enable_on_install=True
 )
 assert done == {{"FINISHED"}}, done
-import OpenEXR, cffi, fileseq, packaging, wgmb, wgpu
-for module in (OpenEXR, cffi, fileseq, packaging, wgmb, wgpu):
+import OpenEXR, cffi, fileseq, wgmb, wgpu
+for module in (OpenEXR, cffi, fileseq, wgmb, wgpu):
     assert "extensions" in module.__file__ and sys.argv[2] in module.__file__, module.__file__
 sys.path.insert(0, {str(ROOT / "tests" / "blender")!r})
 import scenes

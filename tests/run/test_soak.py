@@ -147,7 +147,7 @@ def test_a_case_that_crashes_or_hangs_costs_only_itself():
     cases = ["well", "crashes", "well", "hangs", "exits", "crashes", "well"]
     found = apart(tried, cases).value
     assert [f if isinstance(f, str) else (f["what"], f["why"]) for f in found] == [
-        "well", ("died", "SIGSEGV"), "well", ("hung", "1 s"), ("died", "exit 7"),
+        "well", ("died", "SIGSEGV"), "well", ("hung", "0.5 s"), ("died", "exit 7"),
         ("died", "SIGSEGV"), "well",
     ]  # fmt: skip
 

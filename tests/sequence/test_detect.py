@@ -304,8 +304,8 @@ def test_noise_in_the_dark_is_no_motion():
 
 @pytest.mark.parametrize(
     ("convention", "speed", "text"),
-    [("rsmb", 0.1, "`vector_scale` is twice the longest motion"),
-     ("vray", 0.1, "`vector_scale` is twice the longest motion"),
+    [("rsmb", 0.1, "`vector_scale` must be twice the longest motion"),
+     ("vray", 0.1, "`vector_scale` must be twice the longest motion"),
      ("plain", 0.1, f"`vector_scale={make.WIDTH},{make.HEIGHT}` makes them pixels"),
      ("plain", 3.0, ""), ("vray", 3.0, ""), ("blender", 0.1, ""), ("plain", 0.0, "")],
 )  # fmt: skip

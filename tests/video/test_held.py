@@ -48,6 +48,6 @@ def test_a_delay_that_browsers_do_not_keep_is_theirs(tmp_path):
     reader = animation(tmp_path / "a.gif", (10, 20, 10, 50, 10))
     assert list(reader.times) == [Fraction(n, 100) for n in (0, 10, 12, 22, 27)]
     assert reader.until == Fraction(37, 100)
-    assert "3 pictures with a delay under 0.02 s: shown for 0.1 s" in "; ".join(reader.notes)
+    assert "3 pictures with a delay under 0.02 s are shown for 0.1 s" in "; ".join(reader.notes)
     levels = [int(picture.planes[0][0, 0]) for _, picture in reader]
     assert np.abs(np.array(levels) - [0, 40, 80, 120, 160]).max() <= 2

@@ -51,7 +51,7 @@ COMMANDS = {
     "doctor": "Describe this installation and test one blur, as text to paste into a report.",
     "devices": "List the GPUs for --adapter (or WGMB_ADAPTER); * is the default.",
     "compare": "Score and time methods against a ground truth; write an HTML, JSON and CSV report.",
-    "bench": "Time methods on this machine: median milliseconds per frame, transfers apart.",
+    "bench": "Time methods and videos here: median milliseconds per frame, transfers apart.",
     "perceive": "Simulate a viewer's perception: each frame is held, and earlier ones fade.",
     "shutter": "Draw a shutter: its curve, its integral, and the sum of neighbouring windows.",
 }

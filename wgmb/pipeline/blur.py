@@ -58,7 +58,7 @@ class Blur:
     `shutter`: degrees (180 is open for half a frame interval), or a Shutter. `curve`: with degrees,
     the weight of each instant, a name or a function; see Shutter.
     `samples`: samples per pixel, 1 to 4096 (gather without a GPU: 512); by default 16, or the
-    method's own default; "auto" uses one per pixel of blur length (gather: per two pixels), at
+    method's own default; "auto" uses one per pixel of blur (gather with a box: two pixels), at
     most 64 (methods with one count for the whole image use 64).
     `jitter`: 0 to 1, trades banding for noise: random shift of a sample within its share of time.
     `max_blur`: maximum blur length [px]; None: unlimited.

@@ -39,7 +39,7 @@ def bench(
     adapter: Adapter = None,
     quiet: Quiet = False,
 ) -> int:
-    """Time methods and videos on this machine: median milliseconds per frame, transfers apart.
+    """Time methods and videos here: median milliseconds per frame, transfers apart.
 
     Example: wgmb bench --methods tap,reproject --size 960x540 1920x1080 --samples 4,16,64
 

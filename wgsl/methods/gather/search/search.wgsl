@@ -151,9 +151,9 @@ fn is_static_tile(a: Candidates, b: Candidates, c: Candidates) -> bool {
 }
 
 /// Sample times of the pixel at `x` [px], moved by `shift` within their strata. If ADAPTIVE, they are up to two pixels of its way
-/// apart: each is read at two places, see passing.wgsl.
+/// apart: each is read at two places, see passing.wgsl, which have one weight. Where the shutter's curve is not even, one pixel.
 fn sample_times(x: vec2f, shift: f32, a: Candidates, b: Candidates, c: Candidates) -> SampleTimes {
-    return with_adaptive_count(shutter_times(x, shift), 0.5 * longest_blur(a, b, c));
+    return with_adaptive_count(shutter_times(x, shift), select(1.0, 0.5, BOX_SHUTTER) * longest_blur(a, b, c));
 }
 
 /// Length of the longest candidate motion while the shutter is open [px].
