@@ -1,4 +1,4 @@
-"""The time until the viewer shows what is set, and for which its panel stands still meanwhile.
+"""The time until the viewer shows a changed setting, and how long its panel stands still.
 
     xvfb-run -s '-screen 0 1920x1080x24' python tools/speed/viewer_bench.py [--inline]
         [--size WxH] [SUBJECT ...]

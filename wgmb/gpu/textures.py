@@ -42,7 +42,7 @@ def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -
     band = max(1, _BAND // row)
     for top in range(0, height, band):
         if top:
-            submit(device)  # what is written is held in memory until a submit
+            submit(device)  # written data stays in memory until a submission
         rows = _of_kind(image[top : top + band], kind)
         device.queue.write_texture(
             {"texture": texture, "origin": (0, top, 0)},
@@ -96,7 +96,7 @@ class ScratchBuffer:
 
 
 class KeptViews:
-    """Views of textures of others: of each label, that of the last texture."""
+    """Views of other owners' textures: for each label, the view of its last texture."""
 
     def __init__(self) -> None:
         self._views: dict[str, wgpu.GPUTextureView] = {}

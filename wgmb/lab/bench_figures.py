@@ -86,7 +86,7 @@ class VideoFigure:
     thread: float
     """Milliseconds of the calling thread a picture, without waits."""
     counts: dict[str, float]
-    """Of a picture: what was asked of wgpu (see calls.py), and what was made."""
+    """Calls of wgpu a picture (see calls.py), and objects made."""
 
     @property
     def key(self) -> tuple[Any, ...]:

@@ -146,7 +146,7 @@ def _videos(run: Bench) -> Table:
     note = (
         "Pictures that lie in memory, blurred by the default settings at 180 degrees. Thread: time "
         "in which the calling thread works. The other columns count calls of wgpu a picture, "
-        "of all threads: what is run, waited for and made."
+        "of all threads, and objects of wgpu that are made."
     )
     return Table("Videos", columns, rows, note)
 

@@ -1,4 +1,4 @@
-"""Count what is asked of wgpu: passes, submits, waits, and what is made."""
+"""Count calls of wgpu: passes, submits, waits, and objects that are made."""
 
 from __future__ import annotations
 

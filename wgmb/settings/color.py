@@ -62,7 +62,7 @@ class ColorSettings(DisplaySettings):
     from_: str | None = None
     "Colour space of the input, such as acescg; default: by its attributes, else linear Rec.709."
 
-    def told_of_videos(self) -> str:
+    def unused_by_videos(self) -> str:
         """A line on options that have no effect on videos; "" without any.
 
         InputError for a time, where a part of the video was meant.

@@ -200,8 +200,8 @@ def _two_ways(core: np.ndarray, grey: np.ndarray) -> float:
     """Share of the picture: pixels of strokes that run more than one way, as letters do.
 
     An edge that runs along the motion of the ground stands, too (the aperture problem). Measured
-    near them, across the main direction: 0.43 of the squared contrast of displays, 0.02 to 0.26 of
-    that of houses and roads that pass.
+    near them, across the main direction: displays have 0.43 of their squared contrast, passing
+    houses and roads 0.02 to 0.26.
     """
     y, x = np.nonzero(core)
     height, width = core.shape

@@ -27,7 +27,7 @@ class VideoMotion(ShotMotion):
     """The motion of pictures in time, by their indices, nowhere ragged.
 
     Flow and DenseInverseSearch take them as textures of `device`, in light that is not expanded,
-    others as grey. Smooth motion, such as that of dense inverse search, is left as it is. `light`:
+    others as grey. Smooth motion, as from dense inverse search, is left as it is. `light`:
     the kept light of a picture, if it is not expanded; inverse search, which looks no further than
     the next picture, takes it from there.
     """

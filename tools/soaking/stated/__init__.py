@@ -5,9 +5,9 @@ large. `wgmb info` and `wgmb blur` are then run on each, and the blur of some as
 with searched motion: they end within 10 s of the processor and 1 GB, with one line that names the
 file, or with the right picture.
 
-A picture is right if it is that of the sound file; or the one that the same command makes of a copy
-of the changed file, as another library reads it (`copies`); or if a line on standard error, without
-`-q`, names the file and tells the loss. Anything else is wrong, also where the other library reads
+A picture is right if it equals the sound file's, or the result of the same command on a copy that
+another library makes of the changed file (`copies`), or if a line on standard error, without `-q`,
+names the file and tells the loss. Anything else is wrong, also where the other library reads
 nothing.
 
 A command is run in a process forked from this one, which has imported wgmb already; so this

@@ -252,7 +252,7 @@ def _take_pipe(call: BlurCall) -> int:
         from ...run.pipe import StreamHints
         from ...run.video import VideoRequest
         from .blur_pipe import blur_pipe
-    call.console.say(call.groups.color.told_of_videos())
+    call.console.say(call.groups.color.unused_by_videos())
     request = VideoRequest.of(call.groups)
     hints = StreamHints(call.fps_in, call.color_in)
     return blur_pipe(pattern, output, request, call.console, hints, call.adapter)
@@ -264,7 +264,7 @@ def _take_videos(call: BlurCall) -> int:
     with needed_by(pattern, "video"):
         from ...run.video import VideoRequest
         from .blur_video import blur_videos
-    call.console.say(call.groups.color.told_of_videos())
+    call.console.say(call.groups.color.unused_by_videos())
     request = VideoRequest.of(call.groups)
     return blur_videos(call.patterns, output, request, call.console, call.adapter, call.trial)
 

@@ -71,7 +71,7 @@ def info(
         for name in changed(input):
             if name != "max_mb":
                 raise InputError(f"`{name}` is for rendered frames; a video is described whole")
-        Console().say(color.told_of_videos())
+        Console().say(color.unused_by_videos())
         return tell_about(pattern, input.max_mb, scan)
     if scan:
         raise InputError("`scan` is for videos")

@@ -24,7 +24,7 @@ _NEARBY = 1.15  # of the least difference: as good while it is measured roughly
 _HARDLY = 0.85  # of the stated reading's difference, roughly: more is not clearly better
 _GOLDEN = (5**0.5 - 1) / 2
 _STEPS = 10  # of the golden section: to 0.1 % of the scale
-_NTSC = 1.001
+_NTSC = 1.001  # by which the rates of NTSC are below whole ones
 _RATES = (24, 24 / _NTSC, 25, 30, 30 / _NTSC, 48, 50, 60, 60 / _NTSC, 100, 120)
 """Frames per second, of vectors in pixels per second."""
 _HALVES = tuple(n / 2 for n in range(2, 21))  # frames, that vectors may be of
@@ -283,7 +283,7 @@ def _unknown(reading: _Reading, meant: Vectors, evidence: Evidence) -> str:
 
 
 def _seconds(evidence: Evidence) -> tuple[float, ...]:
-    """The scales that make pixels per second pixels per frame, that of the file first."""
+    """Scales from pixels per second to pixels per frame; the rate of the file comes first."""
     own = (1 / evidence.rate,) if evidence.rate else ()
     return (*own, *(1 / rate for rate in _RATES))
 

@@ -408,7 +408,7 @@ def channels_of(
 
 
 def is_direction_named(names: Iterable[str], vectors: Vectors, near: str | None = None) -> bool:
-    """True if the names of the layers say which way y points: all but those of no program's own."""
+    """True if a program uses the names of the layers, so that they say which way y points."""
     if vectors.convention != "plain":
         return True
     sides = channels_of(names, vectors, near)

@@ -139,7 +139,7 @@ class Average:
                     {"bytes_per_row": pitch, "rows_per_image": len(rows)},
                     (width, len(rows), 1),
                 )
-        gpu.submit(self._device)  # what is written is held in memory until a submit
+        gpu.submit(self._device)  # written data stays in memory until a submission
 
 
 def _invocations(count: int, workgroup: tuple[int, int]) -> tuple[int, int]:

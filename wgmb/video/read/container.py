@@ -110,7 +110,7 @@ def largest_picture(stored: int, max_mb: float) -> dict[str, str]:
 def bound_pictures(container: InputContainer, bound: dict[str, str]) -> None:
     """Bound the pictures that the decoders make, whose size may change within a stream.
 
-    Decoders that know checksums, such as that of PNG, refuse what does not agree with its own.
+    Decoders of formats with checksums, such as PNG, refuse pictures whose checksum is wrong.
     """
     more = bound | {"err_detect": "crccheck"}
     for stream in container.streams.video:
