@@ -204,6 +204,8 @@ def test_for_a_worker_that_is_lost_at_its_start_another_one_comes(monkeypatch):
 
     def lost(cluster, client, count):
         client.wait_for_workers(1, timeout=60)
+        while not cluster.workers:  # the cluster lists a worker a moment after it has answered
+            time.sleep(0.01)
         cluster.sync(cluster.workers[0].close)
         wait(cluster, client, count)
 
