@@ -15,6 +15,7 @@ import make_clips as clips
 from wgmb import InputError
 from wgmb.video.read.container import picture_stream
 from wgmb.video.read.reader import VideoReader
+from wgmb.video.read.stream_reader import StreamReader
 
 pytestmark = pytest.mark.fast
 
@@ -81,6 +82,40 @@ def test_a_wrong_checksum_is_damage(tmp_path):
     reader = VideoReader(path)
     assert [n for n, _ in reader] == [0, 2]
     assert "1 of 3 pictures could not be decoded" in reader.loss()
+
+
+@pytest.mark.parametrize("kind", ["mkv", "avi"])
+@pytest.mark.parametrize("checksums", ["1", "0"])
+def test_a_wrong_checksum_of_ffv1_is_damage(tmp_path, kind, checksums):
+    """Its decoder shows a picture with wrong slices all the same, and those that build on it."""
+    options = {"level": "3", "slicecrc": checksums}
+    path = clips.write(
+        tmp_path / f"a.{kind}",
+        codec="ffv1",
+        options=options,
+        setup=lambda s: setattr(s, "gop_size", 6),
+    )
+    whole = dict(VideoReader(path).pictures())
+    assert not VideoReader(path).loss()
+    with av.open(str(path)) as container:
+        packets = [bytes(p) for p in container.demux(video=0) if p.size]
+    data = bytearray(path.read_bytes())
+    data[data.index(packets[3]) + len(packets[3]) // 2] ^= 4
+    path.write_bytes(data)
+    with path.open("rb") as stream:
+        piped = StreamReader(stream, "a")
+        assert len(list(piped.pictures())) == 12
+    reader = VideoReader(path)
+    got = dict(reader.pictures())
+    wrong = [
+        n for n, one in got.items() if not all(map(np.array_equal, one.planes, whole[n].planes))
+    ]
+    assert wrong == [3, 4, 5]
+    if checksums == "1":
+        assert "3 damaged pictures, the first at" in reader.loss()
+        assert piped.loss == "a: 3 damaged pictures"
+    else:
+        assert not reader.loss()  # nothing in the file tells
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from av.container import InputContainer
 from av.error import EOFError, FFmpegError
 from av.video.stream import VideoStream
 
+from . import damage
 from .container import opened
 from .timeline import Timeline
 
@@ -111,10 +112,10 @@ def decoded(
 ) -> Iterator[av.VideoFrame]:
     """All frames that can be decoded; from the key frame at the tick `key` or one before on.
 
-    Not `careful`: _DamagedError where one cannot be.
+    Not `careful`: _DamagedError where one cannot be, and where a checksum is wrong.
     """
     waiting = key is not None
-    packets = container.demux(stream)
+    packets = damage.marked(container.demux(stream), stream.codec_context)
     while True:
         try:
             packet = next(packets, None)
@@ -128,6 +129,8 @@ def decoded(
             waiting = False
         if packet is not None and not packet.size:
             continue  # a repeated picture (PMP), or PyAV's sign of the end, after which comes None
+        if packet is not None and packet.opaque is not None and not careful:
+            raise _DamagedError
         try:
             yield from stream.decode(packet)
         except EOFError:
@@ -140,7 +143,7 @@ def decoded(
 
 
 class _DamagedError(Exception):
-    """A frame could not be decoded."""
+    """A frame could not be decoded, or is damaged."""
 
 
 class _DecodingTimesError(Exception):

@@ -34,6 +34,7 @@ from ..pixels import (
     planes_of,
 )
 from ..write.encoders import Facts
+from . import damage
 from .color_tags import assumed, either, tags_of
 from .container import has_alpha_beside, opened, picture_stream, size_of
 from .decoder import REORDERED, Decoder, decoded
@@ -382,7 +383,7 @@ class VideoReader:
             if number > last:
                 expected = number
                 break
-            if frame.is_corrupt:
+            if damage.is_damaged(frame):
                 self.damaged.add(number)
             expected = number + 1
             self._is_at_end |= expected == len(self)

@@ -20,6 +20,7 @@ from ...errors import InputError, counted
 from ...io import limits, watch
 from ..pixels import is_transparent, layout, planes_of
 from ..write.encoders import Facts
+from . import damage
 from .color_tags import COLORS, assumed, either, tags_of
 from .container import (
     READERS,
@@ -133,7 +134,7 @@ class StreamReader:
         """
         number, damaged, frame = 0, 0, self._first
         while frame is not None:
-            damaged += frame.is_corrupt
+            damaged += damage.is_damaged(frame)
             if (frame.width, frame.height) != (self._first.width, self._first.height):
                 raise InputError(
                     f"{self.name}: picture {number} is {frame.width} x {frame.height}, "
@@ -180,7 +181,8 @@ class StreamReader:
 
     def _decoded(self) -> Iterator[av.VideoFrame]:
         """The frames in order; those that cannot be decoded are left out, and counted."""
-        packets, end = self._container.demux(self._stream), Fraction(0)
+        packets = damage.marked(self._container.demux(self._stream), self._stream.codec_context)
+        end = Fraction(0)
         while True:
             try:
                 packet = next(packets, None)
