@@ -207,7 +207,7 @@ def test_a_picture_is_one_submission_that_waits_for_nothing(device):
             shot.textures(number)
     levels = len(sizes_of((192, 96)))
     assert levels == 4
-    each = {"dispatches": 3 * levels + 13, "passes": 2, "submits": 1}
+    each = {"dispatches": 3 * levels + 13, "passes": 2, "encoders": 1, "submits": 1}
     assert counts == {kind: 3 * many for kind, many in each.items()}
 
 

@@ -68,7 +68,7 @@ class FlowPasses:
     def submit(self) -> None:
         """Submit the passes that are gathered."""
         if self._gathered is not None:
-            gpu.submit(self.device, self._recorded())
+            gpu.hand_in(self.device, self._recorded())
 
     def read(self, texture: wgpu.GPUTexture) -> np.ndarray:
         """(height, width, channels) contents of a texture after all passes, which are submitted."""
@@ -76,7 +76,7 @@ class FlowPasses:
 
     def _recorded(self) -> wgpu.GPUCommandEncoder:
         """An encoder with the passes that are gathered; none are afterwards."""
-        encoder = self.device.create_command_encoder(label="flow")
+        encoder = gpu.encoder(self.device, "flow")
         gathered, self._gathered = self._gathered, None
         if gathered is not None:
             gathered.play(encoder)

@@ -1,6 +1,7 @@
 """The thin layer over wgpu: devices, kernels, textures, timing. It is independent of blur."""
 
 from .bind_groups import BindGroups, constant
+from .commands import Gathering, before_writing, encoder, gathered, hand_in, submit
 from .device import (
     SOFTWARE,
     adapters,
@@ -12,7 +13,6 @@ from .device import (
     open_device,
     reported,
     second_device,
-    submit,
     texel,
     translated,
 )
@@ -34,18 +34,23 @@ __all__ = [
     "BindGroups",
     "BufferPart",
     "FrameBindings",
+    "Gathering",
     "Kernel",
     "Pass",
     "SizeBindings",
     "Tape",
     "Tapes",
     "adapters",
+    "before_writing",
     "borrow_device",
     "check_size",
     "choose_adapter",
     "claim",
     "constant",
+    "encoder",
+    "gathered",
     "give_back",
+    "hand_in",
     "kernel",
     "lower_priority",
     "open_device",

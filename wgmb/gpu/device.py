@@ -222,12 +222,6 @@ def _is_of_wgpu(error: Exception) -> bool:
     return at is not None and at.tb_frame.f_globals.get("__name__", "").startswith("wgpu.")
 
 
-def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
-    """Submit the recorded commands. The one place that submits."""
-    claim()
-    device.queue.submit([encoder.finish() for encoder in encoders])
-
-
 # ---- wgpu's C types, parsed in a fiftieth of the time -----------------------------------------
 # cffi parses the name of a C type the first time it is used, together with one line for every type
 # of the whole header: 16 ms each time, nearly a second until a first frame is blurred. The parser

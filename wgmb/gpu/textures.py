@@ -10,7 +10,8 @@ import numpy as np
 import wgpu
 
 from ..errors import InputError
-from .device import SOFTWARE, check_size, submit
+from .commands import before_writing, submit
+from .device import SOFTWARE, check_size
 
 _BAND = 4 << 20  # bytes written at once: five times faster at 4K than all at once
 _READBACK = 16 << 20  # bytes read back at once: a buffer takes memory beside the texture;
@@ -40,6 +41,7 @@ def write(device: wgpu.GPUDevice, texture: wgpu.GPUTexture, image: np.ndarray) -
     height, width = image.shape[:2]
     row = width * channels * kind.itemsize
     band = max(1, _BAND // row)
+    before_writing(device)
     for top in range(0, height, band):
         if top:
             submit(device)  # written data stays in memory until a submission

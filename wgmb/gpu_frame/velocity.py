@@ -93,6 +93,7 @@ class VelocityPass:
             self._table = self._device.create_buffer(
                 label="reprojections", size=table.nbytes, usage=usage
             )
+        gpu.before_writing(self._device)
         self._device.queue.write_buffer(self._table, 0, table)
         return self._table
 

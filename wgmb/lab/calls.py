@@ -22,6 +22,7 @@ KINDS: dict[str, list[tuple[type, str]]] = {
         (_api.GPUComputePassEncoder, "dispatch_workgroups_indirect"),
     ],
     "passes": [(_api.GPUCommandEncoder, "begin_compute_pass")],
+    "encoders": [(_api.GPUDevice, "create_command_encoder")],
     "submits": [(_api.GPUQueue, "submit")],
     "waits": [(_api.GPUBuffer, "map_sync"), (_api.GPUQueue, "on_submitted_work_done_sync")],
     "groups": [(_api.GPUDevice, "create_bind_group")],

@@ -320,7 +320,7 @@ class Blur:
         Encoders that take the time of passes get each pass by itself.
         """
         repeats = getattr(self.method, "repeats", None)
-        plain = isinstance(encoder, wgpu.GPUCommandEncoder)
+        plain = isinstance(encoder, wgpu.GPUCommandEncoder | gpu.Gathering)
         if not (plain and repeats is not None and repeats(inputs)):
             self.method.encode(encoder, inputs, output)
             return getattr(self.method, "finds", ())

@@ -80,10 +80,10 @@ class ExposureSum:
     def _add(
         self, waiting: list[tuple[float, wgpu.GPUTexture]], output: wgpu.GPUTexture, onto: bool
     ) -> None:
-        encoder = self._device.create_command_encoder(label="exposure")
+        encoder = gpu.encoder(self._device, "exposure")
         shares = np.array([share for share, _ in waiting], np.float32)
         self._sum.encode(encoder, [texture for _, texture in waiting], shares, output, onto=onto)
-        gpu.submit(self._device, encoder)
+        gpu.hand_in(self._device, encoder)
 
     def _picture(
         self,
@@ -101,7 +101,7 @@ class ExposureSum:
         if isinstance(frame, Frame):
             blur.draw(frame, view, timing)
             return view.texture
-        encoder = self._device.create_command_encoder(label="cell")
+        encoder = gpu.encoder(self._device, "cell")
         blur.encode(
             encoder,
             frame.frame,
@@ -111,7 +111,7 @@ class ExposureSum:
             number=frame.number,
             timing=timing,
         )
-        gpu.submit(self._device, encoder)
+        gpu.hand_in(self._device, encoder)
         return view.texture
 
     def _sharp(self, name: str, frame: FrameViews | Frame) -> wgpu.GPUTexture:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, islice
@@ -141,6 +142,15 @@ class Exposures:
         blur, changing = self._at_edges or self._blur, ChangingLight(self.device)
         return VideoFrames(shots, blur, self._motion, self.holdout, self._planes, changing)
 
+    def in_one(self) -> AbstractContextManager[None]:
+        """Submit the commands of an output frame together.
+
+        Without a GPU each stage is submitted by itself, so that the adapter works on it while the
+        next one is recorded.
+        """
+        in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
+        return nullcontext() if in_software else gpu.gathered(self.device)
+
     def light(
         self, shots: Shots[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]
     ) -> wgpu.GPUTexture:
@@ -152,10 +162,10 @@ class Exposures:
         if self._planes.expansion:
             steps.append(("compressed", self._planes.compress))
         for name, step in steps:
-            encoder = self.device.create_command_encoder(label=name)
+            encoder = gpu.encoder(self.device, name)
             output = self._images.texture(name, size, "rgba32float")
             step(encoder, self._views.of(light), self._views.of(output))
-            gpu.submit(self.device, encoder)
+            gpu.hand_in(self.device, encoder)
             light = output
         return light
 
@@ -172,7 +182,7 @@ class Exposures:
             pictures = [shots[cell.index].content.coded for cell in cells]
             return self._average(pictures, [cell.share for cell in cells], coding)
         light, changes = self._blurred(shots, frames, cells, is_coded=True)
-        encoder = self.device.create_command_encoder(label="encode")
+        encoder = gpu.encoder(self.device, "encode")
         return self._planes.encode(encoder, self._views.of(light), coding, changes)
 
     def _blurred(
@@ -263,11 +273,13 @@ class Exposure:
 
     def light(self) -> wgpu.GPUTexture:
         """As linear light (rgba32float)."""
-        return self._run.light(self._shots, self._frames, self._cells)
+        with self._run.in_one():
+            return self._run.light(self._shots, self._frames, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
         """In the planes of a video."""
-        return self._run.coded(self._shots, self._frames, self._cells, coding)
+        with self._run.in_one():
+            return self._run.coded(self._shots, self._frames, self._cells, coding)
 
 
 class ExposedPicture(Protocol):

@@ -95,10 +95,10 @@ class VideoFrames:
         near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
         factors = self._factors(index)
         surroundings = Surroundings((near[0], index, near[1]), factors, frame.motion, frame.holdout)
-        encoder = self._device.create_command_encoder(label="changing light")
+        encoder = gpu.encoder(self._device, "changing light")
         shares = shares_of(cell.shutter, factors)
         self.changing.encode(encoder, self._light, surroundings, shares, cell.share, begins)
-        gpu.submit(self._device, encoder)
+        gpu.hand_in(self._device, encoder)
         return True
 
     def has_edges(self, cell: Cell) -> bool:
@@ -203,7 +203,7 @@ class VideoFrames:
         size = motion.size[0], motion.size[1]
         output = self._images.texture(name, size, "rgba32float")
         file = "video/gpu_frames.wgsl"
-        encoder = self._device.create_command_encoder(label="pace")
+        encoder = gpu.encoder(self._device, "pace")
         gpu.kernel(self._device, file).run(
             encoder,
             "main",
@@ -212,5 +212,5 @@ class VideoFrames:
             motion=self._views.of(motion),
             output=self._images.view_of(output),
         )
-        gpu.submit(self._device, encoder)
+        gpu.hand_in(self._device, encoder)
         return output

@@ -40,7 +40,7 @@ class RaggedMotion:
         made = images.texture(f"motion {place}", size, "rgba32float")
         made_depth = images.texture(f"depth {place}", (1, 1) if depth is None else size, "r32float")
         ways = self._views.of(motion)
-        encoder = self._device.create_command_encoder(label="ragged motion")
+        encoder = gpu.encoder(self._device, "ragged motion")
         measure = gpu.kernel(self._device, f"{_FOLDER}/measure.wgsl")
         measure.run(encoder, "main", frame, motion=ways, output=measured)
         gpu.kernel(self._device, f"{_FOLDER}/smooth.wgsl").run(
@@ -53,5 +53,5 @@ class RaggedMotion:
             motion_out=images.view_of(made),
             depth_out=images.view_of(made_depth),
         )
-        gpu.submit(self._device, encoder)
+        gpu.hand_in(self._device, encoder)
         return made, None if depth is None else made_depth

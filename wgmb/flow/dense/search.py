@@ -108,16 +108,16 @@ class DenseShot:
             if there[n]:
                 continue
             if encoder is not None:  # what it reads may be drawn over by the next picture
-                gpu.submit(device, encoder)
+                gpu.hand_in(device, encoder)
                 encoder = None
             picture = self._load(n)
             there[n] = picture is not None
             if picture is not None:
-                encoder = device.create_command_encoder(label="motion")
+                encoder = gpu.encoder(device, "motion")
                 self._add(encoder, n, picture)
             elif n == number:
                 return None
-        encoder = encoder or device.create_command_encoder(label="motion")
+        encoder = encoder or gpu.encoder(device, "motion")
         found = None
         if there[number - 1] or there[number + 1]:
             assert self._size is not None
@@ -125,7 +125,7 @@ class DenseShot:
             beside = there[number - 1], there[number + 1]
             found = pictures.stages.find(encoder, number, *beside, self._depth)
             pictures.motions[number % KEPT] = self._me, number, found
-        gpu.submit(device, encoder)
+        gpu.hand_in(device, encoder)
         return found
 
     def _has_levels(self, number: int) -> bool:

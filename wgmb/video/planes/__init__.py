@@ -44,9 +44,9 @@ class Planes:
 
     def draw(self, picture: CodedPicture, output: wgpu.GPUTexture) -> None:
         """Submit a picture's way into `output`, of its size and a format as for `decode`."""
-        encoder = self.device.create_command_encoder(label="decode")
+        encoder = gpu.encoder(self.device, "decode")
         self.decode(encoder, picture, self._views.of(output))
-        gpu.submit(self.device, encoder)
+        gpu.hand_in(self.device, encoder)
 
     def decode(
         self, encoder: wgpu.GPUCommandEncoder, picture: CodedPicture, output: wgpu.GPUTextureView

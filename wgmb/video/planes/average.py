@@ -41,11 +41,11 @@ class Average:
         self, pictures: Sequence[CodedPicture], weights: Sequence[float], wanted: Coding
     ) -> CodedPicture:
         """The sum of pictures of one size and Coding, for which `averages` holds, by `weights`."""
-        encoder = self._device.create_command_encoder(label="average")
+        encoder = gpu.encoder(self._device, "average")
         for first in range(0, len(pictures), EIGHT):
             if first:
-                gpu.submit(self._device, encoder)
-                encoder = self._device.create_command_encoder(label="average")
+                gpu.hand_in(self._device, encoder)
+                encoder = gpu.encoder(self._device, "average")
             some = pictures[first : first + EIGHT]
             ends = first == 0, first + EIGHT >= len(pictures)
             self._add(encoder, some, weights[first : first + EIGHT], wanted, ends)
@@ -123,6 +123,7 @@ class Average:
         return self._images.texture(f"plane {index}", size, _KINDS[texel], EIGHT)
 
     def _upload(self, picture: CodedPicture, layer: int) -> None:
+        gpu.before_writing(self._device)
         for index, plane in enumerate(picture.planes):
             texture = self._layered(index, picture)
             if over := -plane.shape[1] % _samples(index, picture.coding):
