@@ -25,7 +25,7 @@ standard.record()  # every kernel that a test makes; they are sent through Dawn 
 
 # Files that take longest are begun first, so that all workers end at about the same time; those
 # whose kernels another file compiles too come last, and find them in the driver's cache.
-FIRST = ("test_blender", "test_flow", "test_twins", "test_gather_twins", "test_page", "test_window",
+FIRST = ("test_blender", "test_flow", "test_twins", "test_page", "test_window",
          "test_viewer_controls", "test_viewer_perceived", "test_viewer_pictures", "test_farm",
          "test_faults", "test_interruptions", "test_volume", "test_reference", "test_blur_video",
          "test_perceive", "test_standard")  # fmt: skip

@@ -1,10 +1,11 @@
-"""Motion of pictures without vectors: every kernel against its twin, and what is known of whole."""
+"""Motion of pictures without vectors: kernels that have closed forms, and known motion."""
 
 from functools import cache
 
 import numpy as np
 import pytest
 
+from textures import grid, shifted, texture
 from twins import flow as twin
 from wgmb import (
     Blur,
@@ -14,14 +15,13 @@ from wgmb import (
 )
 from wgmb.flow import homography as flow_homography
 from wgmb.flow import passes as flow_passes
-from wgmb.flow.dominant import follow_most, settled
+from wgmb.flow.dominant import follow_most
 from wgmb.flow.homography import dominant_homography
 from wgmb.flow.passes import STATES, FlowPasses
 from wgmb.flow.pyramid import COARSER, features, level_sizes
 from wgmb.flow.result import result
-from wgmb.flow.search import FullSearch
-from wgmb.flow.shot import EFFORTS, Shot, carry, matched, mend
-from wgmb.flow.sweeps import SweptLevel, half_sweep, polish, sweep
+from wgmb.flow.shot import EFFORTS, Shot, matched
+from wgmb.flow.sweeps import SweptLevel, sweep
 from wgmb.flow.views import (
     AROUND,
     BESIDE,
@@ -31,30 +31,6 @@ from wgmb.flow.views import (
 
 MIDDLE, FIRST = Views(1, 2, 0, AROUND), Views(0, 1, 2, BESIDE)
 LARGE = pytest.mark.full
-FILTER = 0.02  # a sampler may filter in 8 bits: cost of a patch
-
-
-def texture(x, y, seed=0, waves=24, longest=40.0):
-    """Band-limited noise at real positions [px], 0.05 to 0.95, three channels."""
-    rng = np.random.default_rng(seed)
-    total = np.zeros((*np.broadcast(x, y).shape, 3))
-    for _ in range(waves):
-        wave = 2 * np.pi / np.exp(rng.uniform(np.log(5), np.log(longest)))
-        angle = rng.uniform(0, 2 * np.pi)
-        phase = rng.uniform(0, 2 * np.pi, 3)
-        along = wave * (x * np.cos(angle) + y * np.sin(angle))
-        total += np.cos(along[..., None] + phase)
-    return np.clip(0.5 + 0.14 * total * np.sqrt(10 / waves), 0.05, 0.95).astype("f4")
-
-
-def grid(size):
-    y, x = np.mgrid[: size[0], : size[1]] + 0.5
-    return x, y
-
-
-def shifted(size, dx, dy, **more):
-    x, y = grid(size)
-    return texture(x - dx, y - dy, **more)
 
 
 @cache
@@ -105,19 +81,6 @@ def small(size=(9, 13), bend=0.0):
     return on_gpu, numbers
 
 
-def matcher(views, stride=1, bend=0.0):
-    numbers = small(bend=bend)[1]
-    far_price = 0.03 if views.factor == BESIDE else 0.0
-    here, near, far = (numbers[n] for n in (views.here, views.near, views.far))
-    return twin.Matcher(here, near, far, views.factor, stride, far_price)
-
-
-def compared(views, level, bend=0.0):
-    """Bindings of match.wgsl that compare the small pictures as on a level."""
-    levels = {n: (level + 1) * found[:1] for n, found in small(bend=bend)[0].items()}
-    return matched(kit(), views, levels, level)
-
-
 def random_states(size=(9, 13), seed=0):
     rng = np.random.default_rng(seed)
     states = rng.normal(0, 0.05, (*size, 8))
@@ -149,143 +112,11 @@ def test_every_level_is_half_as_large(close, mixing):
     close(read(got[1])[..., :7] / 255.0, twin.features(twin.halved(picture)), 0.51 / 255 + mixing)
 
 
-@pytest.mark.covers(0)
-@pytest.mark.parametrize("bend, level", [(0.0, 0), (2.5, 0), (2.5, 1)])
-def test_the_full_search_finds_the_cheapest_displacements(bend, level):
-    """One for both sides, or two where the motion changes so much that no single one fits."""
-    bound = compared(MIDDLE, level, bend)
-    states, centres, ways = FullSearch(kit(), 2)((13, 9), bound)
-    got = read(states)
-    want, sides = twin.full_search(matcher(MIDDLE, level + 1, bend), reach=3)  # a fifth of 13
-    x, y = np.meshgrid(np.arange(0, 13, 2), np.arange(0, 9, 2))
-    assert (centres.reshape(5, 7, 2) - 0.5 == np.stack([x, y], axis=2)).all()
-    assert (ways.reshape(5, 7, 4) == sides).all()
-    assert (got[..., 4:] == 0).all()
-    assert (got[::2, ::2, :4] == want).all()
-    assert (got[1::2, ::2] == got[:-1:2, ::2]).all()
-    assert (want[..., 2:] != 0).any() == (bend > 0)
-
-
-def test_the_motion_of_most_is_taken_where_it_matches_better():
-    """Pixels that move alike to one side are not hidden on the other; others keep their states."""
-    size, bend = (9, 13), 2.5
-    states, match = random_states(seed=8), matcher(MIDDLE, bend=bend)
-    x, y = (n.ravel() for n in grid(size))
-    true = np.array([1.3 + bend / 2, -0.6, -1.3 + bend / 2, 0.6])
-    ways = np.tile(np.round(true), (len(x), 1))
-    ways[::10] += 7
-    bound, given = matched(kit(), MIDDLE, small(bend=bend)[0], 0), states_texture(states)
-    got, _ = follow_most(kit(), (13, 9), bound, MIDDLE, given, np.stack([x, y], axis=1), ways)
-    got = read(got).astype(float)
-    is_kept = (got == states.astype("f4")).all(axis=2)
-    assert 0 < is_kept.sum() < 100
-    taken = got[~is_kept]
-    ways = np.concatenate([taken[:, :2], taken[:, 2:4] - taken[:, :2]], axis=1)
-    assert np.median(np.abs(ways - true)) < 0.3
-    for row, column in np.argwhere(~is_kept):
-        own, most = states[row, column], got[row, column]
-        near, far = own[:2] - most[:2], own[2:4] - own[:2] - most[2:4] + most[:2]
-        cost = match.price(own) + match.cost(column, row, own)
-        cost += 0.03 * (min(np.hypot(*near), np.hypot(*far)) < 1)
-        assert match.cost(column, row, most) < cost + FILTER
-
-
 def test_a_motion_of_most_that_does_not_bend_is_left_to_the_search():
     states, centres = states_texture(random_states()), np.array([[0, 0], [9, 0], [0, 9], [9, 9.0]])
     bound = matched(kit(), MIDDLE, small()[0], 0)
     for ways in (np.zeros((4, 4)), np.tile([1.3, -0.6, -1.3, 0.6], (4, 1))):
         assert follow_most(kit(), (13, 9), bound, MIDDLE, states, centres, ways)[0] is states
-
-
-@pytest.mark.parametrize(
-    ("views", "far", "way"), [(MIDDLE, 1, (4, -2)), (Views(1, 1, 1, AROUND), 60, (0, 0))]
-)
-def test_motion_out_of_the_picture_goes_on_as_most_moves(views, far, way):
-    """On one side, where the other one agrees; on both, where the own motion matches nothing."""
-    rng = np.random.default_rng(9)
-    to_near, to_far = np.eye(3), np.eye(3)
-    to_near[:2, 2], to_far[:2, 2] = [4 * far, -2], [-3.5 * far, 2.5]
-    states = random_states(seed=10)
-    states[..., :2] = way + rng.choice([0, 0.2, 3], (9, 13, 1)) * rng.normal(0, 1, (9, 13, 2))
-    states[..., 4:] *= 0.2
-    bound = matched(kit(), views, small()[0], 0)
-    got = read(settled(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
-    want = twin.settled(matcher(views), states, to_near, to_far)
-    same = np.abs(got - want).max(axis=2) < 1e-3
-    assert same.mean() > 0.95  # the sampler's rounding may decide
-    changed = np.abs(want - states).max(axis=2) > 1e-3
-    assert 0.1 < changed.mean() < 0.9
-    assert same[changed].mean() > 0.9
-
-
-def test_motion_much_like_that_of_most_becomes_it_where_it_matches_as_well():
-    """Not where it is far off, nor where it matches worse."""
-    rng = np.random.default_rng(11)
-    states, to_near, to_far = random_states(seed=12), np.eye(3), np.eye(3)
-    to_near[:2, 2], to_far[:2, 2] = [1.3, -0.6], [-1.3, 0.6]
-    states[...] = 0
-    states[..., :2] = [1.3, -0.6] + rng.choice([0.03, 0.5, 8], (9, 13, 1)) * [0.6, 0.8]
-    match, bound = matcher(MIDDLE), matched(kit(), MIDDLE, small()[0], 0)
-    got = read(settled(kit(), (13, 9), bound, states_texture(states), (to_near, to_far)))
-    want = twin.settled(match, states, to_near, to_far)
-    same = np.abs(got - want).max(axis=2) < 1e-3
-    assert same.mean() > 0.95  # the sampler's rounding may decide
-    is_taken = np.abs(want[..., :2] - [1.3, -0.6]).max(axis=2) < 1e-3
-    assert 0.5 < is_taken.mean() < 0.9
-
-
-@pytest.mark.covers(0)
-@pytest.mark.parametrize("views", [MIDDLE, FIRST])
-@pytest.mark.parametrize("number, aside, level", [(0, 0.4, 1), (1, 0.15, 1), (3, 0.4, 0)])
-def test_half_a_sweep_takes_the_best_candidate(views, number, aside, level):
-    """Nothing that the twin tries is better; the pixels of the other colour stay."""
-    states, match = random_states(), matcher(views, level + 1)
-    bound = compared(views, level)
-    bound["constants"]["ASIDE_PRICE"] = aside
-    output = kit().take((13, 9), STATES)
-    most = np.array([[1.01, 0.02, 3], [-0.01, 1.0, -5], [1e-3, 0, 1]])
-    on = SweptLevel(0, (13, 9), bound, [], most)
-    half_sweep(kit(), on, number, states_texture(states), output)
-    got = read(output).astype(float)
-    improved = 0
-    for y in range(9):
-        for x in range(13):
-            if (x + y) % 2 != number // 2:
-                assert (got[y, x] == states[y, x].astype("f4")).all()
-                continue
-            tried = (twin.propagated, twin.refined)[number % 2](match, states, x, y)
-            energies = [match.energy(x, y, state, states, 2.0, most, aside) for state in tried]
-            new = match.energy(x, y, got[y, x], states, 2.0, most, aside)
-            assert new < min(energies) + FILTER
-            improved += new < energies[0] - FILTER
-    assert improved > 10
-
-
-@pytest.mark.parametrize("views", [MIDDLE, FIRST])
-def test_polishing_takes_steps_that_improve_the_match(views):
-    states, match = random_states(seed=6), matcher(views)
-    states[..., :2] = [1.3, -0.6] + 0.3 * (states[..., :2] - [1.3, -0.6])
-    bound, output = matched(kit(), views, small()[0], 0), kit().take((13, 9), STATES)
-    polish(kit(), (13, 9), bound, states_texture(states), output)
-    got = read(output).astype(float)
-    for y in range(9):
-        for x in range(13):
-            tried = twin.polished(match, states, x, y)
-            costs = [match.price(s) + match.cost(x, y, s) for s in (*tried, got[y, x])]
-            assert costs[-1] < min(costs) + FILTER
-    before, after = (np.abs(s[2:-2, 3:-3, :2] - [1.3, -0.6]).mean() for s in (states, got))
-    assert after < 0.6 * before
-
-
-def test_smooth_states_lie_on_the_planes_around(close):
-    states, output = random_states(seed=7), kit().take((13, 9), STATES)
-    here = small()[0][1][0]
-    kit().run(
-        "smooth.wgsl", "main", (13, 9), here=here, states=states_texture(states), output=output
-    )
-    match = matcher(MIDDLE)
-    want = [[twin.fitted_plane(match, states, x, y) for x in range(13)] for y in range(9)]
-    close(read(output), np.array(want), 1e-3)
 
 
 def test_a_sweep_takes_a_state_that_is_right_and_carried():
@@ -297,37 +128,6 @@ def test_a_sweep_takes_a_state_that_is_right_and_carried():
     on = SweptLevel(0, (13, 9), bound, guesses, np.eye(3))
     got = read(sweep(kit(), on, states_texture(wrong), 1))
     assert np.abs(got[2:-2, 3:-3, :2] - [1.3, -0.6]).max() < 0.3
-
-
-@pytest.mark.covers(0)
-@pytest.mark.parametrize(("views", "along"), [(MIDDLE, 1.0), (MIDDLE, -1.0), (FIRST, 1.0)])
-def test_carried_states(views, along, close):
-    states, match = random_states(seed=1), matcher(views)
-    bound = matched(kit(), views, small()[0], 0)
-    got = read(carry(kit(), (13, 9), bound, states_texture(states), along, -1.0))
-    want = twin.carried(match, states, along, -1.0)
-    same = np.abs(got - want).max(axis=2) < 1e-5
-    assert same.mean() > 0.9  # two that cost about the same may change places
-    assert (want[..., 0] != 0).mean() > 0.7
-
-
-@pytest.mark.parametrize("views", [MIDDLE, FIRST])
-def test_mended_states(views):
-    states, near, far = (random_states(seed=n) for n in (2, 3, 4))
-    near[..., :2] *= -1
-    match, bound = matcher(views), matched(kit(), views, small()[0], 0)
-    neighbours = {
-        views.near: (Views(views.near, views.here, None, BESIDE), states_texture(near)),
-        views.far: (Views(views.far, views.here, None, BESIDE), states_texture(far)),
-    }
-    got = read(mend(kit(), (13, 9), bound, views, states_texture(states), neighbours))
-    beside = far if views is MIDDLE else None
-    is_lost = twin.lost(states, near, beside, views.factor, 1, 1)
-    assert 0.1 < is_lost.mean() < 0.9
-    assert (got[~is_lost] == states[~is_lost].astype("f4")).all()
-    want = twin.mended(match, states, is_lost)
-    same = np.abs(got - want).max(axis=2) < 1e-4
-    assert same[is_lost].mean() > 0.9  # the sampler's rounding may decide between two
 
 
 def test_states_grow_along_their_slopes(close):
@@ -392,7 +192,7 @@ def test_a_frame_is_compared_with_those_around_it():
     assert views_of(7, there) is None
 
 
-# ---- what is known of the whole -------------------------------------------------------------
+# ---- known motion ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from test_flow import MIDDLE, compared, grid, kit, matcher, random_states, read, states_texture
+from test_flow import grid
 from test_flow import texture as textured
 
-from twins import flow as twin
 from wgmb import Flow
-from wgmb.flow.lights import find_lights, follow_lights, move_lights
+from wgmb.flow.lights import find_lights, follow_lights
 
 
 def spotted(*spots, size=(40, 60)):
@@ -38,18 +37,6 @@ def test_lights_are_matched_in_both_frames_or_one():
         [20, 80, 4.5, 4.5, 1, 30, 0, 0], [80, 20, 2, 2, 0, -30, 0, 0]
     ]  # fmt: skip
     assert len(follow_lights(here, near[:0], far[:0], -1.0, 640)) == 0
-
-
-def test_lights_take_their_motion_where_the_own_one_matches_nothing():
-    states, match = random_states(seed=13), matcher(MIDDLE)
-    states[..., :2] += np.random.default_rng(1).choice([0, 5], (9, 13, 1))
-    lights = np.array([[4, 4, 2, 3, 1.3, -0.6, 0, 0], [10, 3, 1, 1, 6, 3, 0, 0.0]])
-    given = states_texture(states)
-    got = read(move_lights(kit(), (13, 9), compared(MIDDLE, 0), given, lights))
-    want = twin.lit(match, states, lights)
-    same = np.abs(got - want).max(axis=2) < 1e-5
-    assert same.mean() > 0.95  # the sampler's rounding may decide
-    assert (np.abs(want - states).max(axis=2) > 1e-5).sum() > 3
 
 
 @pytest.mark.parametrize("quality", ["fast", pytest.param("best", marks=pytest.mark.full)])

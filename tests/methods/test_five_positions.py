@@ -5,7 +5,6 @@ import pytest
 
 import wgmb
 from images import frame_of
-from twins import gather as gather_twin
 from twins import reproject as reproject_twin
 from twins import tap as tap_twin
 from wgmb import Shutter
@@ -157,18 +156,13 @@ def test_a_parabola_stays_one(method, least):
 @pytest.mark.covers(1)
 @pytest.mark.parametrize("path", [swings, circles, shakes, starts, bounces])
 @pytest.mark.parametrize("frames", [2, 3])
-@pytest.mark.parametrize("method", ["gather", "reproject"])
-def test_methods_are_their_twins_on_such_paths(method, path, frames):
+def test_reproject_is_its_twin_on_such_paths(path, frames):
     size = (32, 56)
     sources = [(t, *shot(path, t, size)) for t in (0, -1, 1)[:frames]]
     own, *near = [wgmb.Frame(c, motion=m, depth=d) for _, c, m, d in sources]
     frame = own.between(*near, *[None] * (3 - frames))
-    got = wgmb.Blur(method, samples=4, shutter=360)(frame)
-    times = Shutter(360).sample_times(4).astype(float)
-    if method == "gather":
-        want = gather_twin.gather(sources, times)
-    else:
-        want, _ = reproject_twin.reproject(sources, times)
+    got = wgmb.Blur("reproject", samples=4, shutter=360)(frame)
+    want, _ = reproject_twin.reproject(sources, Shutter(360).sample_times(4).astype(float))
     assert (np.abs(got - want) > 1e-3).any(axis=2).mean() < 0.01
 
 

@@ -1,4 +1,4 @@
-"""Shadows and reflections that move: every stage is its twin, and the blur is nearer the truth."""
+"""Shadows and reflections that move: the blur is nearer the truth."""
 
 from dataclasses import replace
 
@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 import wgmb
-from twins import moving_light as twin
+from moving_light_scenes import (
+    AT_REST,
+    PAN,
+    SIZE,
+    SPEED,
+    around,
+    bare,
+    behind_a_body,
+    between_bodies,
+    centres,
+    scene,
+)
 from wgmb import (
     Blur,
     Frame,
@@ -23,85 +34,7 @@ from wgmb.methods.gather.shading import (
     MovingLight,
     SurfaceLight,
 )
-from wgmb.methods.gather.shading.flow import level_sizes, patch_grid
 from wgmb.render import Render
-
-SIZE = (45, 70)  # height, width
-SPEED = (4.0, -1.5)  # of the shadow [px per frame]
-PAN = (1.25, 0.5)  # of everything [px per frame]
-
-
-AT_REST = {"pan": (0, 0), "scale": 2}
-
-
-def ground(x, y):
-    """A textured surface."""
-    wave = np.sin(0.7 * x) * np.cos(0.55 * y + 0.2 * x)
-    return 0.5 + 0.25 * wave[..., None] * np.array([1, 0.8, 0.5])
-
-
-def shadow(x, y, t, radius):
-    """A soft disc that moves over the surface, and a bar that rests."""
-    far = np.hypot(x - 34 - SPEED[0] * t, y - 25 - SPEED[1] * t)
-    disc = 1 / (1 + np.exp(1.5 * (far - radius)))
-    bar = 1 / (1 + np.exp(2.0 * (np.abs(y - 10) - 3)))
-    return (1 - 0.85 * disc)[..., None] * (1 - 0.5 * bar)[..., None] * np.array([1.1, 1, 0.9])
-
-
-def scene(t, pan=PAN, glossy=False, size=SIZE, still=False, radius=8, scale=1):
-    """The frame at the time t, without neighbours, with passes of light; `scale` times as large."""
-    size = size[0] * scale, size[1] * scale
-    x, y = (at / scale for at in twin.centres(size))
-    x, y = x - pan[0] * t, y - pan[1] * t
-    albedo, light = ground(x, y), shadow(x, y, 0 if still else t, radius)
-    motion = np.broadcast_to(np.array([-pan[0], -pan[1], *pan]), (*size, 4))
-    passes = ("glossy_light", "glossy_color") if glossy else ("diffuse_light", "diffuse_color")
-    given = dict(zip(passes, (light, albedo), strict=True))
-    given |= {"color": albedo * light, "motion": motion, "depth": np.full(size, 7.0)}
-    return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
-
-
-def behind_a_body(t):
-    """A body before flat ground, and the shadow that it draws behind it; both move to the left."""
-    x, y = twin.centres(SIZE)
-    body = (np.abs(x - 23 + 11 * t) < 13) & (np.abs(y - 23) < 13)
-    far = np.maximum(np.abs(y - 24) - 11 + 0.5 * (x - 36 + 11 * t), x - 50 + 11 * t)
-    light = np.where(body, 0.8, 1 - 0.8 / (1 + np.exp(3 * far)))[..., None] * np.ones(3)
-    albedo = np.where(body[..., None], 0.3, ground(x, y))
-    motion = np.where(body[..., None], np.array([11.0, 0, -11, 0]), 0)
-    given = {"color": albedo * light, "diffuse_light": light, "diffuse_color": albedo,
-             "motion": motion, "depth": np.where(body, 4.0, 7)}  # fmt: skip
-    return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
-
-
-def between_bodies(t):
-    """A shadow that goes to the right with a body far above it, behind one that goes to the left.
-
-    In either neighbour one of the two bodies hides the ground that is in the shadow.
-    """
-    x, y = twin.centres(SIZE)
-    low = (np.abs(x - 42 + 22 * t) < 12) & (np.abs(y - 30) < 11)
-    high = (np.abs(x - 24 - 22 * t) < 9) & (np.abs(y - 12) < 6)
-    far = np.maximum(np.abs(x - 24 - 22 * t) - 9, np.abs(y - 30) - 6)
-    body = low | high
-    light = np.where(body, 0.8, 1 - 0.8 / (1 + np.exp(3 * far)))[..., None] * np.ones(3)
-    albedo = np.where(body[..., None], 0.3, ground(x, y))
-    motion = np.where(low[..., None], (22.0, 0, -22, 0), high[..., None] * [-22.0, 0, 22, 0])
-    given = {"color": albedo * light, "diffuse_light": light, "diffuse_color": albedo,
-             "motion": motion, "depth": np.where(low, 4.0, np.where(high, 5, 7))}  # fmt: skip
-    return Frame(**{name: np.asarray(array, "f4") for name, array in given.items()})
-
-
-def around(**how):
-    """The frame between its neighbours."""
-    return scene(0, **how).between(scene(-1, **how), scene(1, **how))
-
-
-def bare(frame):
-    """The frame and its neighbours without passes of light."""
-    none = {"diffuse_light": None, "diffuse_color": None, "prev": None, "next": None}
-    one, before, after = (replace(f, **none) for f in (frame, frame.prev, frame.next))
-    return one.between(before, after)
 
 
 def truth(shutter, **how):
@@ -121,99 +54,43 @@ def device():
 
 
 class Stages:
-    """All that the passes of one kind of light wrote."""
+    """All textures and flags that the passes of one kind of light wrote."""
 
-    def __init__(self, device, pulled, whole=None, fold=0.0, resting=False):
-        """`fold`: from the middle of the shadow on, depth grows by this share per pixel. `resting`:
-        a pixel of light is 2 x 2; what is on the left moves.
-        """
+    def __init__(self, device, pulled=False, resting=False):
+        """`resting`: a pixel of light is 2 x 2, and what is on the left moves."""
         pool, light = TexturePool(device), MovingLight(device)
-        scale = 2 if resting else 1
-        size = SIZE[0] * scale, SIZE[1] * scale
-        whole = whole or around(glossy=pulled, **AT_REST if resting else {})
-        self.pulled, self.resting = pulled, resting
-        assert whole.prev is not None and whole.next is not None
-        self.frames, seen = {}, {}
+        whole, seen = around(glossy=pulled, **AT_REST if resting else {}), {}
         for offset, frame in ((0, whole), (-1, whole.prev), (1, whole.next)):
             given = frame.glossy_light if pulled else frame.diffuse_light
-            if resting:
-                given = frame.color[..., :3]
-            assert given is not None and frame.depth is not None and frame.motion is not None
-            rng = np.random.default_rng(offset + 5)
-            edges = rng.random(size) < 0.002
-            beyond = np.maximum(np.arange(size[1]) / scale - 36, 0)
-            depth = np.where(edges, 14, frame.depth * (1 + fold * beyond)).astype("f4")
+            given = frame.color[..., :3] if resting else given
             motion = np.array(frame.motion)
-            if resting:
-                motion[:, :18] = 0.5
-            light_there = np.dstack([given, np.ones(size, "f4")])
+            motion[:, : 18 * resting] = 0.5
+            rgba = np.dstack([given, np.ones_like(frame.depth)])
             seen[offset] = SurfaceLight(
-                pool.upload(f"light {offset}", light_there, "rgba32float"),
-                pool.upload(f"depth {offset}", depth, "r32float"),
+                pool.upload(f"light {offset}", rgba, "rgba32float"),
+                pool.upload(f"depth {offset}", frame.depth, "r32float"),
                 pool.upload(f"motion {offset}", motion, "rgba32float"),
             )
-            given = {"light": given, "depth": depth, "motion": motion}
-            self.frames[offset] = twin.reduced(given, 2) if resting else given
         color = whole.glossy_color if pulled else whole.diffuse_color
-        assert color is not None
-        self.albedo = np.ones((*SIZE, 3)) if resting else color
         albedo = pool.upload("albedo", np.dstack([color, color[..., :1]]), "rgba32float")
-        bindings = Blur("gather", device=device).frame_bindings(size[::-1])
-        self.times = LightTimes.within(-0.5, 0.5, 4)
+        bindings = Blur("gather", device=device).frame_bindings(whole.depth.shape[::-1])
         encoder = device.create_command_encoder()
         kinds = [Kind(pulled, seen, None if resting else albedo, resting, resting)]
-        done = light.encode(encoder, bindings, kinds, self.times, None)
+        done = light.encode(encoder, bindings, kinds, LightTimes.within(-0.5, 0.5, 4), None)
         gpu.submit(device, encoder)
         self.found = np.frombuffer(device.queue.read_buffer(done.change_flags), np.uint32)
-        self._device, self._pool, self._light, self._layers = device, pool, light, done.layers
+        self._device, self._pool, self._light = device, pool, light
         self._kind = "glossy" if pulled else "diffuse"
-
-    def tiles(self, known, reach=0):
-        """True at pixels of tiles of which this is known, or of one `reach` tiles away at most."""
-        down, across = (-(-n // 16) for n in SIZE)
-        flags = np.pad(self.found[1:].reshape(down, across) & known != 0, reach)
-        near = [np.roll(flags, by, (0, 1)) for by in np.ndindex(2 * reach + 1, 2 * reach + 1)]
-        rows, columns = (np.arange(n) // 16 for n in SIZE)
-        return np.any([n[2 * reach :, 2 * reach :] for n in near], axis=0)[rows][:, columns]
 
     def __getitem__(self, name):
         name = f"{self._kind} {name}" if name.startswith("changes") else name
         texture = self._light._images._textures[f"shading {name}"]
         return self._pool.download(self._device.create_command_encoder(), texture).astype(float)
 
-    def layer(self, index):
-        width, height = SIZE[::-1]
-        one = self._pool.texture("layer", (width, height), "rgba16float")
-        encoder = self._device.create_command_encoder()
-        encoder.copy_texture_to_texture(
-            {"texture": self._layers, "origin": (0, 0, index)},
-            {"texture": one},
-            (width, height, 1),
-        )
-        return self._pool.download(encoder, one).astype(float)
-
 
 @pytest.fixture(scope="module", params=["shadows", "reflections", "resting"])
 def stages(request, device):
-    kind = request.param
-    return Stages(device, kind == "reflections", fold=0.05, resting=kind == "resting")
-
-
-def test_what_changes_is_its_twin(stages, close):
-    here = stages.frames[0]
-    assert stages.found[0] == 1
-    for side in (-1, 1):
-        change, seen = twin.measure(here, stages.frames[side], side, stages.pulled, stages.resting)
-        assert 0.5 < seen.mean() < 0.99
-        want = twin.limited(change, seen, here["light"], stages.albedo, stages.pulled)
-        got = stages[f"changes {side}"]
-        known = stages.tiles(1, reach=1)
-        around = [twin.shifted(known, i, j) for j in (-1, 0, 1) for i in (-1, 0, 1)]
-        within = np.all(around, axis=0)  # at its border, pixels may count as those of an edge
-        close(got[..., 3] * within, seen & within, 0)
-        assert not got[~known].any()
-        close(got[..., :3], want, 4e-3)
-        assert np.abs(want).max() > 0.5
+    return Stages(device, request.param == "reflections", request.param == "resting")
 
 
 def test_tiles_near_changes_are_found(stages):
@@ -251,191 +128,11 @@ def test_far_from_moving_light_the_picture_is_that_without():
     assert not np.array_equal(got[:, :60], off(one)[:, :60])
 
 
-def test_values_are_their_twin(stages, close):
-    before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
-    here = stages.frames[0]
-    bright = -np.inf
-    if not (stages.pulled or stages.resting):
-        bright = twin.closed(here["light"], here["depth"], before, after, 12)
-    for offset, change in ((0, 0 * before), (-1, before), (1, after)):
-        want = twin.values(here["light"], before, after, bright, change, stages.pulled)
-        close(stages[f"values {offset}"], want, 4e-3)
-
-
-def test_a_fold_parts_light_and_flow(stages):
-    """Else the twins of both would be those of a plane."""
-    depth = stages.frames[0]["depth"]
-    assert 0 < twin.creases(depth)[:, 36].mean() <= 1
-    assert twin.creases(depth).mean() < 0.1
-    flow = np.broadcast_to((5.0, 0.0), (*SIZE, 2))
-    stays = twin.on_one_surface(flow, depth)
-    assert stays[:, :28].mean() > 0.9
-    assert not stays[:, 33:36].any()
-
-
-def test_levels_are_their_twin(stages, close):
-    want = twin.first_level(stages["values 1"], stages.pulled)
-    close(stages["level 0 1"][..., :3], want, 1e-3)
-    for i in range(1, len(level_sizes(SIZE[::-1]))):
-        want = twin.next_level(stages[f"level {i - 1} 1"])
-        close(stages[f"level {i} 1"][..., :3], want, 1e-3)
-        close(stages[f"level {i} squares 1"], twin.squares(stages[f"level {i} 1"]), 1e-3)
-
-
-def test_patches_are_found_as_by_their_twin(stages):
-    here, there = stages["level 1 1"], stages["level 1 0"]  # the last search: from the next frame
-    across, down = patch_grid(here.shape[1::-1])
-    first, again = stages["patches 1 a"], stages["patches 1 b"]  # the second is propagated
-    searched = 0
-    for j in range(down):
-        for i in range(across):
-            patch = twin.Patch(here, there, (i, j), apart=2)
-            if again[j, i, 3] == 0:
-                continue
-            searched += 1
-            near = [(j + 2 * b, i + 2 * a) for b in (-1, 0, 1) for a in (-1, 0, 1)]
-            starts = [first[min(max(b, 0), down - 1), min(max(a, 0), across - 1), :2]
-                      for b, a in near]  # fmt: skip
-            _, cost = patch.best([first[j, i, :2], *starts])
-            found, _ = patch.compare(again[j, i, :2])
-            np.testing.assert_allclose(again[j, i, 2], found, atol=2e-3)
-            assert found <= 1.1 * cost + 2e-3
-    assert searched > 10
-
-
 def test_flow_is_that_of_the_shadow(device):
-    flow = Stages(device, False)["flow ahead 1"]
+    flow = Stages(device)["flow ahead 1"]
     found = flow[22:30, 30:40]
     np.testing.assert_allclose(found[..., :2].mean((0, 1)), SPEED, atol=0.6)
     assert found[..., 2].min() > 0.9
-
-
-def test_trust_is_its_twin(stages, close):
-    for side in (-1, 1):
-        own, other = stages["values 0"][..., 3], stages[f"values {side}"][..., 3]
-        depth = stages.frames[0]["depth"]
-        ahead, back = (stages[f"flow {name} {side}"] for name in ("ahead", "back"))
-        want = twin.trust(ahead[..., :2], back[..., :2], own, other, depth)
-        # What is trusted again is the filled flow, of half floats as it is.
-        close(ahead[..., 2], want, 2e-2)
-        raw = stages["level flow 0 ahead"][..., :2] if side == 1 else None
-        if raw is not None:
-            raw_back = stages["level flow 0 back"][..., :2]
-            sure = twin.trust(raw, raw_back, own, other, depth)
-            close(ahead[..., :2], twin.filled(raw, sure, own), 0.05)
-
-
-@pytest.mark.parametrize("scene", [behind_a_body, between_bodies])
-def test_what_is_extrapolated_is_its_twin(device, close, scene):
-    """Half of the shadow is hidden in the next frame: the previous one and bodies tell of it."""
-    stages = Stages(device, False, scene(0).between(scene(-1), scene(1)))
-    own, frame = stages["values 0"][..., 3], stages.frames[0]
-    near = stages.tiles(4)
-    depth, motion = frame["depth"], frame["motion"].astype(float)
-    cells = near[::4, ::4][..., None]
-    found = twin.bodies(depth, motion)
-    for one, name in zip(found, ("nearest bodies", "other bodies"), strict=True):
-        close(stages[name], np.where(cells, one, 0), 2e-3)
-    motions = twin.motions_of(found)
-    assert found[1].any() == (scene is between_bodies)
-    sides = {}
-    for side in (-1, 1):
-        seen, other = stages[f"changes {side}"][..., 3] > 0, stages[f"values {side}"][..., 3]
-        sides[side] = twin.compared(motions, own, other, depth, seen, side, near)
-        differs = np.abs(sides[side] - stages[f"bodies {side}"])[cells[..., 0]]
-        assert np.mean(differs > 2e-2) < 0.03  # where rounding decides what is one surface
-    bodies = stages["bodies"]
-    want = twin.chosen_body(motions, sum(stages[f"bodies {side}"] for side in (-1, 1)))
-    close(bodies, np.where(cells, want, 0), 2e-2)
-    flows = {side: stages[f"flow ahead {side}"] for side in (-1, 1)}
-    explained = {side: stages[f"explained {side}"] for side in (-1, 1)}
-    for side in (-1, 1):
-        seen, other = stages[f"changes {side}"][..., 3] > 0, stages[f"values {side}"][..., 3]
-        back, body = stages[f"flow back {side}"][..., :2], twin.body_at(bodies, side, SIZE)
-        want = twin.explained(
-            flows[side][..., :2], back, own, other, flows[-side], body, depth, seen, near
-        )
-        differs = np.abs(want - explained[side])[near[::2, ::2]]
-        assert np.mean(differs > 5e-3) < 0.03  # where rounding decides what is one surface
-        best = twin.chosen(flows[side], flows[-side], body, explained[side], explained[-side])
-        assert 0.02 < np.mean(best[..., 2] < 0) < 0.5
-        assert (stages[f"settled {side}"][..., 3] < 0).any()
-        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen)
-        differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
-        assert np.mean(differs > 5e-2) < 0.02  # where rounding decides which one is better
-        reached = twin.carried(own, stages[f"settled {side}"], max(stages.times))
-        reached &= stages.found[1:].reshape(reached.shape) & 4 != 0
-        assert reached.any()
-        assert (stages.found[1:].reshape(reached.shape)[reached] & 2 != 0).all()
-    for i, time in list(enumerate(stages.times))[::3]:
-        change, _ = change_by_twin(stages, time)
-        want = twin.added(change, frame["light"], stages.albedo)
-        differs = np.abs(want - stages.layer(i)[..., :3]).max(axis=2)[stages.tiles(2)]
-        assert np.mean(differs > 2e-2) < 0.01 < np.mean(np.abs(want).max(axis=2) > 2e-2)
-
-
-def change_by_twin(stages, time):
-    """The change of light at a node, and how sure it is."""
-    own, side, share = stages["values 0"], -1 if time < 0 else 1, abs(time)
-    before, after = (stages[f"changes {i}"][..., :3] for i in (-1, 1))
-    other = stages[f"values {side}"]
-    ahead = f"flow ahead {side}" if stages.pulled else f"settled {side}"
-    flows = [stages[ahead], stages[f"flow back {side}"]]
-    trusts = [flow[..., 2] for flow in flows]
-    if stages.pulled:
-        change, trusted = twin.pulled(
-            own[..., :3], other[..., :3], [f[..., :2] for f in flows], trusts, share
-        )
-    else:
-        a = twin.pushed(own, flows[0][..., :2], trusts[0], share)
-        b = twin.pushed(other, flows[1][..., :2], trusts[1], 1 - share)
-        explains = flows[0][..., 3]
-        change, trusted = twin.from_pushed(
-            a, b, own, other, trusts, explains, share, stages.resting
-        )
-    hidden = np.any([stages[f"changes {i}"][..., 3] == 0 for i in (-1, 1)], axis=0)
-    hidden &= not stages.pulled
-    sure = twin.sure(own, other, flows, trusted, stages.pulled)
-    return twin.clamped(change, before, after, hidden, own), sure
-
-
-def test_flow_on_what_rests_has_to_explain_more(device):
-    """The frame has no shadow, and alone is bright where those before and after it meet."""
-    before, after = (scene(t, radius=6, **AT_REST) for t in (-1, 1))
-    whole = scene(0, radius=-9, **AT_REST).between(before, after)
-    stages = Stages(device, False, whole, resting=True)
-    own, depth = stages["values 0"][..., 3], stages.frames[0]["depth"]
-    near, still = stages.tiles(4), np.zeros((*SIZE, 2))
-    flows = {side: stages[f"flow ahead {side}"] for side in (-1, 1)}
-    sides = {side: stages[f"values {side}"][..., 3] for side in (-1, 1)}
-    alone = np.maximum(np.minimum(sides[-1], sides[1]) - own, 0)
-    assert alone.max() > 0.01
-    found = {side: stages[f"explained {side}"] for side in (-1, 1)}
-    for side, other in sides.items():
-        seen, back = stages[f"changes {side}"][..., 3] > 0, stages[f"flow back {side}"][..., :2]
-        want = twin.explained(
-            flows[side][..., :2], back, own, other, flows[-side], still, depth, seen, near, alone
-        )
-        assert np.mean(np.abs(want - found[side])[near[::2, ::2]] > 5e-3) < 0.03
-        best = twin.chosen(flows[side], flows[-side], still, found[side], found[-side], True)
-        want = twin.settled(np.where(near[..., None], best, 0), own, other, depth, seen, True)
-        differs = np.abs(want - stages[f"settled {side}"]).max(axis=2)[near]
-        assert np.mean(differs > 5e-2) < 0.02
-
-
-def test_what_is_added_is_its_twin(stages, close):
-    before, after = (stages[f"changes {side}"][..., :3] for side in (-1, 1))
-    here = {"light": np.ones((*SIZE, 3)) - 0.02} if stages.resting else stages.frames[0]
-    moved = 0.0
-    for i, time in enumerate(stages.times):
-        change, sure = change_by_twin(stages, time)
-        want = twin.added(change, here["light"], stages.albedo, stages.pulled)
-        close(stages.layer(i), np.dstack([want, sure]), 2e-2)
-        moved = max(moved, np.abs(want).max())
-    assert moved > 0.1
-    for i, change in enumerate((before, after)):
-        want = twin.added(change, here["light"], stages.albedo, stages.pulled)
-        close(stages.layer(stages.times.count + i)[..., :3], want, 4e-3)
 
 
 @pytest.mark.covers(0)
@@ -615,7 +312,7 @@ def test_shadows_on_what_rests_need_no_passes(scale, width):
 
 def test_a_bright_reflection_is_no_shadow():
     """Unasked, nothing is followed where the frame alone is bright."""
-    x, _ = twin.centres((90, 140))
+    x, _ = centres((90, 140))
 
     def lit(t):
         bar = np.exp(-0.5 * ((x - 70 - 14 * t) / 5) ** 2)[..., None]
@@ -663,23 +360,12 @@ def accepted(frame, shading="auto", **how):
 def flash(pan=(0.0, 0.0), glossy=False):
     """A spot of shadow in the middle one of three frames alone, where light rests otherwise."""
     lit = around(pan=pan, glossy=glossy, still=True)
-    x, y = twin.centres(SIZE)
+    x, y = centres(SIZE)
     spot = 1 - 0.8 / (1 + np.exp(2 * (np.hypot(x - 52, y - 30) - 5)))[..., None]
     name = "glossy_light" if glossy else "diffuse_light"
     light = (getattr(lit, name) * spot).astype("f4")
     dark = replace(lit, color=(lit.color * spot).astype("f4"), **{name: light})
     return dark.between(lit.prev, lit.next), spot[..., 0] < 0.6
-
-
-@pytest.mark.covers(0)
-@pytest.mark.parametrize("pulled", [False, True], ids=["shadows", "reflections"])
-def test_what_is_not_followed_is_as_sure_as_its_twin(device, close, pulled):
-    stages = Stages(device, pulled, flash(glossy=pulled)[0])
-    near = stages.tiles(4)  # elsewhere nothing is written, nor read
-    for i, time in enumerate(stages.times):
-        _, sure = change_by_twin(stages, time)
-        close(np.where(near, stages.layer(i)[..., 3], 1), sure, 2e-2)
-        assert sure.min() < 0.1 < 0.8 < np.mean(sure > 0.95)
 
 
 @pytest.mark.covers(0)

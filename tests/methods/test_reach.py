@@ -5,7 +5,6 @@ import pytest
 
 import make_clips
 import make_frames as make
-from twins import gather as gather_twin
 from wgmb import (
     Blur,
     Clip,
@@ -99,20 +98,6 @@ def test_a_reach_of_one_does_not_look_beyond_the_neighbours(shot):
 def test_without_frames_beyond_it_is_a_reach_of_one(offsets):
     frame = frame_at(bars, offsets)
     assert np.array_equal(blurred(frame, 2), blurred(frame, 1))
-
-
-@pytest.mark.covers(0)
-@pytest.mark.parametrize(
-    "offsets", [(0, 1, 2), (0, -1, 1, -2, 2), pytest.param((0, -1, 1, -2), marks=pytest.mark.full)]
-)
-def test_bars_are_their_twin(offsets):
-    size = (20, 112)
-    sources = [(o, *bars(o, size)) for o in offsets]
-    got = Blur("gather", samples=4, shutter=360, reach=2)(
-        frame_at(lambda o: bars(o, size), offsets)
-    )
-    want = gather_twin.gather(sources, Shutter(360).sample_times(4).astype(float))
-    assert (np.abs(got - want).max(axis=2) > 1e-3).mean() < 0.01
 
 
 @pytest.mark.full

@@ -45,16 +45,6 @@ def is_same(found):
     return 1 / 1.15 < found[1] < 1.15
 
 
-def depth_ratio(offset, motion, z, y, x, prev, next):
-    """Depth of a neighbour's surface in the frame itself, as a ratio to that in the neighbour."""
-    if abs(offset) != 1:
-        return 1.0
-    frame, side = (prev, 0) if offset > 0 else (next, 1)
-    forth, back = (np.s_[:2], np.s_[2:])[:: 1 - 2 * side]
-    found = found_again(frame, motion[forth], back, z, y, x)
-    return found[1] if found else 1.0
-
-
 def bend(motion, z, y, x, prev, next):
     """Third term of the path of a pixel through five positions, 1 if it has a kink instead."""
     here, there = (motion[:2] + motion[2:]) / 2, []
