@@ -1,13 +1,20 @@
 """Calls of wgpu for each picture of a video, as on a GPU: counts are the same on every adapter."""
 
+import threading
+from collections import Counter
+
 import numpy as np
 import pytest
+import wgpu
+from wgpu.backends.wgpu_native import _api
 
+import make_clips as clips
 import wgmb
 from wgmb import gpu
 from wgmb.flow import Flow, pyramid
 from wgmb.lab.calls import KINDS, counted
 from wgmb.lab.video_bench import flow_settings, synthetic_pictures
+from wgmb.video.read.reader import VideoReader
 
 SIZE = (96, 64)
 TURN = 7  # pictures after which all rings of textures have had a turn
@@ -59,6 +66,35 @@ def test_a_picture_with_a_display_takes_one_submission_more(device, as_with_a_gp
             next(run)
         if number >= TURN:
             assert calls["submits"] <= 3, calls
+
+
+def lumas(path):
+    return [picture.planes[0].tobytes() for _, picture in VideoReader(path).pictures()]
+
+
+def test_planes_come_down_while_the_next_picture_is_recorded(tmp_path, monkeypatch):
+    """The thread that writes waits for them, in buffers that are there after a few pictures."""
+    source, waits, staging = clips.write(tmp_path / "in.mkv", codec="ffv1"), Counter(), []
+    settings = {"flow": "none", "codec": "ffv1", "speed": 0.5}
+    wgmb.blur_video(source, tmp_path / "want.mkv", **settings)
+    want = lumas(tmp_path / "want.mkv")
+    wait, create = wgpu.GPUPromise.sync_wait, _api.GPUDevice.create_buffer
+
+    def waited(promise):
+        waits[threading.current_thread().name] += "buffer" in repr(promise)
+        return wait(promise)
+
+    def created(device, *args, **options):
+        staging.extend([1] if options.get("label") == "planes" else [])
+        return create(device, *args, **options)
+
+    monkeypatch.setattr(gpu, "SOFTWARE", "no device")
+    monkeypatch.setattr(wgpu.GPUPromise, "sync_wait", waited)
+    monkeypatch.setattr(_api.GPUDevice, "create_buffer", created)
+    wgmb.blur_video(source, tmp_path / "got.mkv", **settings)
+    assert lumas(tmp_path / "got.mkv") == want
+    assert +waits == {"write": len(want)}
+    assert len(staging) <= 6 < len(want), "one for each picture that waits"
 
 
 def searched(device, shown):

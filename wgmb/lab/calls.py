@@ -24,7 +24,7 @@ KINDS: dict[str, list[tuple[type, str]]] = {
     "passes": [(_api.GPUCommandEncoder, "begin_compute_pass")],
     "encoders": [(_api.GPUDevice, "create_command_encoder")],
     "submits": [(_api.GPUQueue, "submit")],
-    "waits": [(_api.GPUBuffer, "map_sync"), (_api.GPUQueue, "on_submitted_work_done_sync")],
+    "waits": [(_api.GPUPromise, "sync_wait")],
     "groups": [(_api.GPUDevice, "create_bind_group")],
     "buffers": [(_api.GPUDevice, "create_buffer")],
     "textures": [(_api.GPUDevice, "create_texture")],

@@ -277,7 +277,7 @@ class Exposure:
             return self._run.light(self._shots, self._frames, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
-        """In the planes of a video."""
+        """In the planes of a video; with a GPU they may be on their way when this returns."""
         with self._run.in_one():
             return self._run.coded(self._shots, self._frames, self._cells, coding)
 

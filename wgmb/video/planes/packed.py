@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ class Packed:
 
     def __init__(self, device: wgpu.GPUDevice):
         self._device, self._buffer = device, ScratchBuffer(device)
-        self._staging: wgpu.GPUBuffer | None = None
+        self._free: list[wgpu.GPUBuffer] = []  # to be mapped; others hold pictures on their way
 
     def buffer(self, places: list[PlaneSlot]) -> wgpu.GPUBuffer:
         """The buffer for these planes; its contents are undefined."""
@@ -42,27 +43,60 @@ class Packed:
     def read(
         self, encoder: wgpu.GPUCommandEncoder, places: list[PlaneSlot], coding: Coding
     ) -> CodedPicture:
-        """Submit the passes that write the buffer, and return the planes."""
-        size, usage = 4 * _words(places), wgpu.BufferUsage
-        if self._staging is None or self._staging.size != size:
-            self._staging = self._device.create_buffer(
-                label="planes", size=size, usage=usage.COPY_DST | usage.MAP_READ
-            )
-        encoder.copy_buffer_to_buffer(self.buffer(places), 0, self._staging, 0, size)
+        """Submit the passes that write the buffer, and return the planes.
+
+        With a GPU, they are on their way: any thread may wait for them, and others be made
+        meanwhile.
+        """
+        size = 4 * _words(places)
+        staging = self._staging(size)
+        encoder.copy_buffer_to_buffer(self.buffer(places), 0, staging, 0, size)
         gpu.submit(self._device, encoder)
-        self._staging.map_sync(wgpu.MapMode.READ)
-        try:
-            everything = np.array(self._staging.read_mapped(copy=False), copy=True).view(np.uint8)
-        finally:
-            self._staging.unmap()
-        kind = np.dtype("<u2" if coding.bits > 8 else "u1")
-        planes = []
-        for place in places:
-            width, height = place.size
-            rows = everything[4 * place.first :][: 4 * place.words * height]
-            rows = rows.view(kind).reshape(height, -1)
-            planes.append(np.ascontiguousarray(rows[:, :width]))
-        return CodedPicture(tuple(planes), coding)
+        mapped = staging.map_async(wgpu.MapMode.READ)
+
+        def planes() -> tuple[np.ndarray, ...]:
+            with gpu.reported():
+                mapped.sync_wait()
+                try:
+                    data = np.array(staging.read_mapped(copy=False), copy=True).view(np.uint8)
+                finally:
+                    staging.unmap()
+            self._free.append(staging)
+            return tuple(_plane(data, place, coding) for place in places)
+
+        coming = _Coming(planes, coding)
+        if self._device.adapter_info["adapter_type"] == gpu.SOFTWARE:
+            _ = coming.planes  # a submission is not interrupted there, so that one is waited for
+        return coming
+
+    def _staging(self, size: int) -> wgpu.GPUBuffer:
+        """A buffer that no picture has; those of another size are forgotten."""
+        while self._free:
+            if (one := self._free.pop()).size == size:
+                return one
+        usage = wgpu.BufferUsage.COPY_DST | wgpu.BufferUsage.MAP_READ
+        return self._device.create_buffer(label="planes", size=size, usage=usage)
+
+
+class _Coming(CodedPicture):
+    """A picture on its way from the GPU: the first who asks for its planes waits for them."""
+
+    def __init__(self, read: Callable[[], tuple[np.ndarray, ...]], coding: Coding):
+        vars(self).update(coding=coding, _read=read)
+
+    def __getattr__(self, name: str) -> tuple[np.ndarray, ...]:
+        if name != "planes":
+            raise AttributeError(name)
+        vars(self)["planes"] = planes = vars(self).pop("_read")()
+        return planes
+
+
+def _plane(data: np.ndarray, place: PlaneSlot, coding: Coding) -> np.ndarray:
+    """One plane of all bytes of a picture, as an array of its own."""
+    width, height = place.size
+    rows = data[4 * place.first :][: 4 * place.words * height]
+    rows = rows.view("<u2" if coding.bits > 8 else "u1").reshape(height, -1)
+    return np.ascontiguousarray(rows[:, :width])
 
 
 def _words(places: list[PlaneSlot]) -> int:
