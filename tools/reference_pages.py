@@ -17,7 +17,7 @@ from wgmb.cli.app import COMMANDS, make_app
 from wgmb.cli.help import GROUPS, MAIN, about, place
 from wgmb.scene import builtin
 from wgmb.sequence.layers.vectors import CONVENTIONS
-from wgmb.settings.programs import PROGRAMS
+from wgmb.settings.input import PROGRAMS
 
 DOCS = Path(__file__).parents[1] / "docs"
 _KINDS = {bool: "", int: "N", float: "X", str: "TEXT", Path: "PATH"}

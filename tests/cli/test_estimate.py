@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from wgmb.cli.estimate import Estimate, spelled
+from wgmb.cli.commands.blur_video import Estimate, spelled
 
 pytestmark = pytest.mark.fast
 

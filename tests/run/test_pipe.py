@@ -14,8 +14,7 @@ import pytest
 
 import make_clips as clips
 from wgmb import InputError
-from wgmb.cli.app import main
-from wgmb.cli.streams import named
+from wgmb.cli.app import main, named
 from wgmb.color.coding import CodedPicture, Coding
 from wgmb.io.pipes import STDIN, STDOUT
 from wgmb.run.pipe import reader_of

@@ -11,7 +11,7 @@ import make_frames as make
 from wgmb import Clip, InputError, Passes, Vectors
 from wgmb.sequence.folder import frames_in
 from wgmb.settings import InputSettings
-from wgmb.settings.programs import PROGRAMS, ProgramName
+from wgmb.settings.input import PROGRAMS, ProgramName
 
 NUMBERS = (4, 5, 6)
 UP = np.array([1, -1], "f4")

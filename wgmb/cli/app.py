@@ -12,6 +12,7 @@ import re
 import signal
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import cyclopts
@@ -29,6 +30,7 @@ from ..errors import (
 )
 from ..extras import EXTRAS, reason
 from ..interpreter import handle_signals
+from ..io.pipes import STDIN, STDOUT
 from . import interruption, run_log, terminal
 from .exit_codes import (
     DONE,
@@ -39,7 +41,20 @@ from .exit_codes import (
 )
 from .help import IN_FULL, MAIN, CommandHelp
 from .spelling import as_options
-from .streams import named
+
+_OUTPUTS = "-o", "--output", "--log-json"
+
+
+def named(words: Sequence[str]) -> list[str]:
+    """The words of a command line with the names of the streams in place of `-`."""
+    found = []
+    for before, word in zip(["", *words], words, strict=False):
+        if word == "-":
+            word = STDOUT if before in _OUTPUTS else STDIN
+        option, _, value = word.partition("=")
+        found.append(f"{option}={STDOUT}" if option in _OUTPUTS and value == "-" else word)
+    return found
+
 
 COMMANDS = {
     "blur": "Blur rendered frames or videos.",

@@ -20,7 +20,6 @@ from ..shots.cut_list import CutList
 from ..shots.held_poses import may_be_held
 from ..shots.motion import MotionSource
 from .data_windows import Placement
-from .dependencies import Dependencies
 from .files import SequenceFiles
 from .findings import SequenceFindings
 from .flow_motion import PictureMotion, standing
@@ -32,6 +31,46 @@ from .layers.masks import Masks
 from .layers.passes import Passes
 from .layers.vector_convention import ConventionFinder
 from .neighbours import HELD, Neighbours
+
+
+class Dependencies:
+    """The files of a sequence's frames, their masks, and `others`, on which all of them depend."""
+
+    def __init__(self, files: SequenceFiles, masks: Masks, others: tuple[Path | None, ...]):
+        self._files, self._masks = files, masks
+        self._others = [one for path in others if path for one in files.of_views(path)]
+
+    def of(self, number: int) -> list[Path]:
+        """Every file that frame `number` depends on."""
+        return [*self._files.every_path(number), *self._masks.files(number), *self._others]
+
+    def every(self) -> Iterator[Path]:
+        """All files that may be read, of all frames on disk."""
+        for number in self._files.on_disk:
+            yield from self.of(number)
+
+    def states(self, number: int, reach: int) -> list[list[str | int]]:
+        """Name, size [bytes] and time of change [ns] of every file that the result of frame
+        `number` depends on; among them those of up to `reach` frames before and after it.
+        """
+        around = [number]
+        for side in (-1, 1) if self._files.is_sequence else ():
+            for n in range(number + side, number + side * (reach + 1), side):
+                if not self._files.is_there(n):
+                    break
+                around.append(n)
+        paths = (p for n in around for p in (*self.of(n), *self._masks.manifests(n)))
+        return [[path.name, *_size_and_time(path)] for path in dict.fromkeys(paths)]
+
+
+def _size_and_time(path: Path) -> tuple[int, int]:
+    """Of a file; -1 where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return -1, -1
+    return found.st_size, found.st_mtime_ns
+
 
 _SHOWN = 5  # sequences of a folder that are named
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -22,7 +23,6 @@ from ..shots.cuts import (
 )
 from ..shots.held_poses import TWOS, may_be_held, without_jumps
 from . import panorama_signs
-from .clip_frame import ClipFrame
 from .data_windows import (
     OUTSIDE,
     Placement,
@@ -40,6 +40,44 @@ from .data_windows import (
 from .frame_builder import FrameBuilder
 from .frame_cache import FrameCache
 from .frame_file import FrameFile
+
+Load = Callable[[int], Frame | None]
+"""Reads the frame before (-1) or after (1), of the same shot; None where there is none."""
+
+
+class ClipFrame(Frame):
+    """A frame of a Clip. `prev` and `next` are read when they are asked for, and not kept."""
+
+    @classmethod
+    def of(cls, frame: Frame, load: Load) -> ClipFrame:
+        """The frame with neighbours that `load` reads."""
+        made = object.__new__(cls)
+        made.__dict__.update({k: v for k, v in vars(frame).items() if k not in ("prev", "next")})
+        made.__dict__["_load"] = load
+        return made
+
+    def __repr__(self) -> str:
+        alone = copy(self)
+        alone.__dict__.pop("_load", None)  # nothing is read to be counted
+        return Frame.__repr__(alone)
+
+
+def _side(name: str, side: int) -> property:
+    def read(frame: ClipFrame) -> Frame | None:
+        own: dict[str, Any] = vars(frame)
+        if name in own:
+            return own[name]
+        return own["_load"](side) if "_load" in own else None
+
+    def put(frame: ClipFrame, other: Frame | None) -> None:
+        vars(frame)[name] = other
+
+    return property(read, put, doc=f"The frame {'before' if side < 0 else 'after'}, or None.")
+
+
+for _name, _number in (("prev", -1), ("next", 1)):  # a property is found before what is stored
+    setattr(ClipFrame, _name, _side(_name, _number))
+
 
 HELD = (
     "has poses that are held, as in animation on twos: their jumps are not blurred; "
