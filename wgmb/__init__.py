@@ -22,13 +22,7 @@ if TYPE_CHECKING:
     from .camera import Camera, Reprojections
     from .color.spaces import ColorConfig, ColorSpace, Display
     from .cone import Cone
-    from .errors import (
-        DeviceError,
-        Error,
-        GpuMemoryError,
-        InputError,
-        ShaderError,
-    )
+    from .errors import DeviceError, Error, GpuMemoryError, InputError, ShaderError
     from .flow import Flow
     from .frame import Frame
     from .gpu_frame.views import FrameViews

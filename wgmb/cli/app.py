@@ -21,24 +21,12 @@ from cyclopts.config import Dict
 
 from .._version import __version__
 from ..allocator import bound_free_memory
-from ..errors import (
-    DeviceError,
-    Error,
-    InputError,
-    did_you_mean,
-    meant_setting,
-)
+from ..errors import DeviceError, Error, InputError, did_you_mean, meant_setting
 from ..extras import EXTRAS, reason
 from ..interpreter import handle_signals
 from ..io.pipes import STDIN, STDOUT
 from . import interruption, run_log, terminal
-from .exit_codes import (
-    DONE,
-    INTERRUPTED,
-    NO_DEVICE,
-    SOME_FAILED,
-    USAGE,
-)
+from .exit_codes import DONE, INTERRUPTED, NO_DEVICE, SOME_FAILED, USAGE
 from .help import IN_FULL, MAIN, CommandHelp
 from .spelling import as_options
 

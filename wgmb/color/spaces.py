@@ -15,13 +15,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from . import config_files, ocio
-from .primaries import (
-    AP0,
-    AP1,
-    REC709,
-    conversion,
-    of_matrix,
-)
+from .primaries import AP0, AP1, REC709, conversion, of_matrix
 from .srgb import ToDisplay
 
 _NAMED_BY = "colorInteropID", "oiio:ColorSpace", "colorspace"

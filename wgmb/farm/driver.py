@@ -25,14 +25,7 @@ from ..run.report import BatchReport, Failure, Progress, describe_input
 from ..sequence.findings import ranges
 from ..threads import within
 from . import local, merge
-from .workers import (
-    LATE,
-    TIMES_LATE,
-    Chunk,
-    Worker,
-    WorkerPool,
-    size_of_part,
-)
+from .workers import LATE, TIMES_LATE, Chunk, Worker, WorkerPool, size_of_part
 
 _LOOK = 0.5  # seconds after which the driver looks who is there
 _ANSWER = 10.0  # seconds in which a worker that runs answers a question

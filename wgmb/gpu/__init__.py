@@ -16,16 +16,7 @@ from .device import (
     texel,
     translated,
 )
-from .kernels import (
-    BufferPart,
-    FrameBindings,
-    Kernel,
-    Pass,
-    SizeBindings,
-    kernel,
-    stored,
-    uniform,
-)
+from .kernels import BufferPart, FrameBindings, Kernel, Pass, SizeBindings, kernel, stored, uniform
 from .priority import lower_priority, yielding
 from .tape import Tape, Tapes
 

@@ -1,7 +1,5 @@
 """Bindings of all passes over a frame: its constants, the shutter, and the times of the samples."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

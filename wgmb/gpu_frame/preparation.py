@@ -1,7 +1,5 @@
 """Work around a method: motion is completed, and holdouts are taken out and put back."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from collections.abc import Sequence

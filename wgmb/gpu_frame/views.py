@@ -1,7 +1,5 @@
 """One frame as textures: the GPU counterpart of `Frame`, and the input of `Blur.encode`."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import re

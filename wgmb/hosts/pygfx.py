@@ -8,12 +8,7 @@ import numpy as np
 import wgpu
 
 from .. import gpu
-from ..camera import (
-    MAX_INDEX,
-    MOST_BODIES,
-    Camera,
-    Reprojections,
-)
+from ..camera import MAX_INDEX, MOST_BODIES, Camera, Reprojections
 from ..errors import InputError
 from ..extras import needed_by
 from ..gpu import wgsl

@@ -18,20 +18,9 @@ from PIL import Image
 
 from ..charts import Axes, log_ticks, ticks
 from ..io.atomic import mode_of, write_file
-from ..metrics import (
-    FLIP_GAIN,
-    METRICS,
-    display,
-    flip_colors,
-)
+from ..metrics import FLIP_GAIN, METRICS, display, flip_colors
 from .cases import Case
-from .results import (
-    Bars,
-    Entry,
-    Plot,
-    Report,
-    Table,
-)
+from .results import Bars, Entry, Plot, Report, Table
 
 _COLORS = 10  # in report.html
 _TEMPLATE = Path(__file__).with_name("report.html")

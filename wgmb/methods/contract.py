@@ -1,7 +1,5 @@
 """The contract between the pipeline and a method: its interface and its inputs."""
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Each field is annotated with its type, its range where it is a number, and its h
     variant: Annotated[Literal["even", "published"], "even: ...; published: as printed."] = "even"
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import math

@@ -10,12 +10,7 @@ import wgpu
 from .. import gpu
 from ..errors import InputError
 from ..gpu import wgsl
-from ..scene.density import (
-    TURN,
-    Rotation,
-    overrides,
-    tables,
-)
+from ..scene.density import TURN, Rotation, overrides, tables
 from ..scene.figure import RATE, Figure
 from ..scene.gbuffer import SceneOnGpu
 from ..scene.volumes import Backdrop, OrbitingSphere, Torus

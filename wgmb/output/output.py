@@ -16,18 +16,8 @@ from ..color.spaces import Display
 from ..color.srgb import ToDisplay, to_display
 from ..errors import InputError, check_choice
 from ..extras import needed_by
-from ..io import (
-    atomic,
-    exr,
-    record,
-    stills,
-)
-from ..io.frame_numbers import (
-    frame_path,
-    has_view,
-    in_view,
-    is_pattern,
-)
+from ..io import atomic, exr, record, stills
+from ..io.frame_numbers import frame_path, has_view, in_view, is_pattern
 from ..io.suffixes import DEEP, STILLS, VIDEOS
 from ..sequence.frame_file import FrameFile, about
 from ..sequence.input_color import space_of

@@ -8,12 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sequence.data_windows import (
-    Placement,
-    Window,
-    laid,
-    result_window,
-)
+from ..sequence.data_windows import Placement, Window, laid, result_window
 from ..sequence.frame_file import FrameFile
 
 

@@ -25,22 +25,9 @@ from ..gpu_frame.bindings import AUTO_STRATA, FrameConstants
 from ..gpu_frame.preparation import Preparation
 from ..gpu_frame.residency import Residency
 from ..gpu_frame.velocity import VelocityPass
-from ..gpu_frame.views import (
-    FrameViews,
-    View,
-    check_output,
-    check_view,
-    view_of,
-)
+from ..gpu_frame.views import FrameViews, View, check_output, check_view, view_of
 from ..methods import METHODS, check_takes_frames
-from ..methods.contract import (
-    Inputs,
-    Method,
-    PreparedFrame,
-    extent_of,
-    frames_around,
-    reach_of,
-)
+from ..methods.contract import Inputs, Method, PreparedFrame, extent_of, frames_around, reach_of
 from ..methods.keywords import Curve, MethodKeywords, MethodName
 from ..scene.gbuffer import SceneOnGpu
 from ..shutter import Shutter, Weight

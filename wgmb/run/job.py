@@ -17,13 +17,7 @@ from .. import gpu
 from ..color.spaces import ColorSpace, Display
 from ..errors import InputError
 from ..io import atomic
-from ..io.frame_numbers import (
-    frame_list,
-    frame_path,
-    has_view,
-    in_view,
-    numbered,
-)
+from ..io.frame_numbers import frame_list, frame_path, has_view, in_view, numbered
 from ..io.suffixes import STILLS
 from ..methods import METHODS, check_method
 from ..output.names import check_suffix

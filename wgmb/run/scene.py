@@ -15,13 +15,7 @@ from ..output.output import Output
 from ..output.result import Result
 from ..render import Render
 from ..sequence.frame_file import FrameFile
-from ..settings import (
-    BlurSettings,
-    OutputSettings,
-    SceneSettings,
-    ShutterSettings,
-    size_of,
-)
+from ..settings import BlurSettings, OutputSettings, SceneSettings, ShutterSettings, size_of
 from ..settings.color import DisplaySettings, color_record
 from ..settings.record import record
 from .engine import IsDone, RunOptions

@@ -1,13 +1,6 @@
 """Scenes that are rendered: bodies, volumes, figures, and the built-in ones."""
 
-from .bodies import (
-    Body,
-    at,
-    moving,
-    rotation,
-    scaling,
-    translation,
-)
+from .bodies import Body, at, moving, rotation, scaling, translation
 from .builtin import SCENES, make
 from .scene import CameraPath, Scene
 from .volumes import Backdrop, OrbitingSphere, Torus

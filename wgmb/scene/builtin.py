@@ -14,14 +14,7 @@ import numpy as np
 
 from ..cone import VIDEOS
 from ..errors import InputError, check_choice, did_you_mean
-from .bodies import (
-    Body,
-    Color,
-    at,
-    moving,
-    rotation,
-    translation,
-)
+from .bodies import Body, Color, at, moving, rotation, translation
 from .figure import RATE, Figure
 from .scene import CameraPath, Scene
 from .torusphere import torusphere

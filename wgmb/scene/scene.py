@@ -11,15 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, check_choice
-from .bodies import (
-    PATTERNS,
-    SHAPES,
-    Body,
-    Color,
-    rotation,
-    times_of,
-    translation,
-)
+from .bodies import PATTERNS, SHAPES, Body, Color, rotation, times_of, translation
 from .volumes import Backdrop, Instant, Volume
 
 if TYPE_CHECKING:

@@ -11,12 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from .scene import CameraPath, Scene
-from .volumes import (
-    Backdrop,
-    Instant,
-    OrbitingSphere,
-    Torus,
-)
+from .volumes import Backdrop, Instant, OrbitingSphere, Torus
 
 TURN = 2 * math.pi
 BEGIN = 25.0  # seconds of the animation that have passed at iTime 0

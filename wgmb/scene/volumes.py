@@ -8,13 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .bodies import (
-    Body,
-    Color,
-    at,
-    rotation,
-    translation,
-)
+from .bodies import Body, Color, at, rotation, translation
 
 
 @dataclass(frozen=True, kw_only=True)

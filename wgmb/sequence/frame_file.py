@@ -15,12 +15,7 @@ import numpy as np
 from ..color.spaces import ColorSpace
 from ..errors import InputError, size_text
 from ..io import data_files, exr, limits, record, stills
-from ..io.frame_numbers import (
-    frame_range,
-    has_view,
-    in_view,
-    readable,
-)
+from ..io.frame_numbers import frame_range, has_view, in_view, readable
 from .data_windows import Window, laid
 from .layers import light, names, stereo, vectors
 

@@ -14,13 +14,7 @@ from ..errors import InputError, check_choice
 from ..extent import Extent
 from ..frame import Frame
 from ..pipeline import panorama
-from ..shots.cuts import (
-    frames_differ,
-    is_cut,
-    jumps,
-    still,
-    straightened,
-)
+from ..shots.cuts import frames_differ, is_cut, jumps, still, straightened
 from ..shots.held_poses import TWOS, may_be_held, without_jumps
 from . import panorama_signs
 from .data_windows import (

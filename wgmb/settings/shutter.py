@@ -10,13 +10,7 @@ from typing import Any, Literal, Self
 from ..errors import InputError, check_choice
 from ..io.frame_numbers import readable
 from ..scene.scene import Scene
-from ..shutter import (
-    CURVES,
-    PHASES,
-    Shutter,
-    curve_bytes,
-    read_curve,
-)
+from ..shutter import CURVES, PHASES, Shutter, curve_bytes, read_curve
 from .record import plain
 
 _FEW_DEGREES = 5  # below, an angle is rather the share of an interval that others count in

@@ -16,11 +16,7 @@ from ...settings import size_of
 from .. import terminal
 from ..console import Console
 from ..options import Adapter, Quiet
-from ..pages import (
-    command_line,
-    pages_of,
-    whole_numbers,
-)
+from ..pages import command_line, pages_of, whole_numbers
 from ..terminal import out
 
 

@@ -12,14 +12,7 @@ from cyclopts import Parameter
 
 from ... import gpu
 from ...errors import InputError, check_choice
-from ...lab.cases import (
-    Candidate,
-    Case,
-    SceneFrame,
-    clip_case,
-    make_scene,
-    scene_case,
-)
+from ...lab.cases import Candidate, Case, SceneFrame, clip_case, make_scene, scene_case
 from ...lab.compare import Laboratory, crossings
 from ...lab.papers.experiments import EXPERIMENTS
 from ...lab.report import write
@@ -34,11 +27,7 @@ from ...shutter import Shutter
 from ..console import Console
 from ..help import MAIN
 from ..options import Adapter, InputOptions, Inputs, Quiet, ShutterOptions, Shutters
-from ..pages import (
-    command_line,
-    pages_of,
-    whole_numbers,
-)
+from ..pages import command_line, pages_of, whole_numbers
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,12 +14,7 @@ from pathlib import Path
 from ... import interpreter
 from ..._version import __version__
 from ...errors import DeviceError, Error
-from ...extras import (
-    EXTRAS,
-    install_command,
-    is_available,
-    is_installed,
-)
+from ...extras import EXTRAS, install_command, is_available, is_installed
 from ...requirements import version_of
 from ..exit_codes import DONE, NO_DEVICE, SOME_FAILED
 from ..spelling import as_options

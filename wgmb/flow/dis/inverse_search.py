@@ -3,8 +3,6 @@
 Kroeger, Timofte, Dai and Van Gool, "Fast Optical Flow using Dense Inverse Search" (2016).
 """
 
-# pyright: reportMissingParameterType=true, reportMissingTypeArgument=true
-
 from __future__ import annotations
 
 import functools

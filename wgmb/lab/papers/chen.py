@@ -11,12 +11,7 @@ from ...methods import METHODS
 from ...metrics import METRICS, display
 from ...scene import builtin
 from ...shutter import Shutter
-from ..cases import (
-    Candidate,
-    Case,
-    SceneFrame,
-    scene_case,
-)
+from ..cases import Candidate, Case, SceneFrame, scene_case
 from ..compare import Laboratory
 from ..findings import about, holds
 from ..results import Plot, Report, Table

@@ -10,12 +10,7 @@ import numpy as np
 from ...metrics import METRICS
 from ...scene import builtin
 from ...shutter import Shutter
-from ..cases import (
-    Candidate,
-    Case,
-    SceneFrame,
-    scene_case,
-)
+from ..cases import Candidate, Case, SceneFrame, scene_case
 from ..compare import Laboratory
 from ..findings import about, holds
 from ..results import Report, Table

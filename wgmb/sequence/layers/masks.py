@@ -19,12 +19,7 @@ from ...io.frame_numbers import frame_path, in_view, is_pattern, numbers_on_disk
 from ..data_windows import laid
 from ..frame_file import FrameFile, read
 from . import cryptomatte
-from .names import (
-    Channels,
-    grey,
-    layers,
-    one_channel,
-)
+from .names import Channels, grey, layers, one_channel
 
 _AMOUNT = re.compile(r"(.+):([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 

@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ..data_windows import (
-    Window,
-    laid,
-    near_enough,
-    union,
-)
+from ..data_windows import Window, laid, near_enough, union
 from ..frame_cache import FrameCache
 from ..frame_file import FrameFile
 from . import depth_order, light, names, vector_test, vectors
