@@ -85,7 +85,17 @@ class ThreadClock:
 def apart(work: Callable[[], _Item], check: Callable[[], None] = lambda: None) -> _Item:
     """The result of `work`, made in a thread of its own, so that Ctrl-C does not wait for it.
 
-    Exceptions of `work` are raised here. `check` is called every 0.05 s, and may raise: that ends
+    All else as for `started`.
+    """
+    return started(work, "apart", check)()
+
+
+def started(
+    work: Callable[[], _Item], name: str = "started", check: Callable[[], None] = lambda: None
+) -> Callable[[], _Item]:
+    """Begin `work` in a thread of its own; the function returned waits for its result, once.
+
+    Exceptions of `work` are raised there. `check` is called every 0.05 s, and may raise: that ends
     the wait, as an interruption does. The thread then goes on until `work` ends, or the program
     does.
     """
@@ -97,11 +107,14 @@ def apart(work: Callable[[], _Item], check: Callable[[], None] = lambda: None) -
         except BaseException as error:  # raised where it is waited for
             done.put(error)
 
-    begin(make, "apart")
-    entry = _taken(done, check)
-    if isinstance(entry, BaseException):
-        raise entry
-    return entry.pop()
+    def result() -> _Item:
+        entry = _taken(done, check)
+        if isinstance(entry, BaseException):
+            raise entry
+        return entry.pop()
+
+    begin(make, name)
+    return result
 
 
 def ahead(

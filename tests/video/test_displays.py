@@ -1,5 +1,6 @@
 """Displays and captions before moving ground stay legible, and nothing else is taken for one."""
 
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -169,6 +170,31 @@ def test_a_mask_depends_on_the_pictures_around_alone(clip):
         in_order.mask(n)
     alone = Displays(shown.__getitem__, lambda _, n: n in shown)
     np.testing.assert_array_equal(in_order.mask(10), alone.mask(10))
+
+
+def test_masks_begun_ahead_are_the_same_and_made_in_another_thread(clip, monkeypatch):
+    """Also where more pictures are there when a mask is asked for than when it was begun."""
+    found, made = [grey(one) for one in clip[0]], []
+    want = [finder(clip[0]).mask(n) for n in range(COUNT)]
+    there = range(COUNT)
+    ahead = Displays(found.__getitem__, lambda _, n: n in there, ahead=True)
+    make_one = Displays._searched
+
+    def noted(self, window):
+        made.append((window.number, threading.current_thread().name))
+        return make_one(self, window)
+
+    monkeypatch.setattr(Displays, "_searched", noted)
+    got = [ahead.mask(n) for n in range(5)]
+    there = range(8)  # fewer for the picture that is begun next
+    got.append(ahead.mask(5))
+    there = range(COUNT)
+    got += [ahead.mask(n) for n in range(6, COUNT)]
+    for n in set(range(COUNT)) - {5}:
+        np.testing.assert_array_equal(got[n], want[n])
+    here = threading.current_thread().name
+    assert [n for n, name in made if name == here] == [0, 1, 5, 6]
+    assert [n for n, name in made if name == "displays"] == list(range(2, COUNT))
 
 
 def test_sums_and_contrast_are_those_of_loops():

@@ -140,9 +140,9 @@ class _FrameHoldout(Holdout):
 
     masks: Callable[[int], np.ndarray | None] | None = None
 
-    def of(self, shots: Any) -> Callable[[int], np.ndarray | None]:
-        """Masks of pictures, by their indices."""
-        return super().of(shots) if self.masks is None else self.masks
+    def of(self, shots: Any, ahead: bool = False) -> Callable[[int], np.ndarray | None]:
+        """Masks of pictures, by their indices. `ahead`: see Displays."""
+        return super().of(shots, ahead) if self.masks is None else self.masks
 
 
 @dataclass(frozen=True)

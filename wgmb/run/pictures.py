@@ -214,7 +214,7 @@ def blur_pictures(
     `pictures`: an iterable of arrays (height, width, 3 or 4), all of one size and type: RGB, and
     straight alpha; uint8, uint16 (of their whole range), or float, of which 1 is white. Tensors of
     other libraries in the CPU's memory are taken by DLPack. They are copied, and read as far as the
-    next result needs: at most a dozen are held, and ten more while a flash is told from a cut.
+    next result needs: at most 15 are held, and ten more while a flash is told from a cut.
     `fps_in`, `fps`: pictures per second of the input and of the output; without `fps`, there is a
     result for each picture. `transfer`: the meaning of the samples; floats that are "linear" are
     not rounded and may exceed 1. `holdout` (height, width): 1 stays sharp; "none": nothing;

@@ -11,8 +11,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
+
+from .. import threads
 
 REACH = 5  # pictures to each side that are looked at
 _STILL = 5  # successive steps without a change, from which a pixel stands
@@ -52,12 +55,27 @@ class _Picture:
         return cls(grey, contrast, over + _CLEARLY * clearly)
 
 
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """The greys of a picture and of those around that have a say in its mask, by their numbers."""
+
+    number: int
+    greys: dict[int, np.ndarray]
+
+    def is_same(self, other: _Window) -> bool:
+        """True if the mask is the same."""
+        return (self.number, [*self.greys]) == (other.number, [*other.greys]) and all(
+            grey is other.greys[n] for n, grey in self.greys.items()
+        )
+
+
 class Displays:
     """Displays in pictures, one after the other.
 
     `load(number)`: a picture (height, width) uint8, its display values without colour.
     `leads(number, other)`: whether motion leads from a picture to another, which is there then.
     `always`: also where their share of the picture, or a standing camera, speaks against a display.
+    `ahead`: once a picture follows another, the mask of the next one is begun in a thread beside.
     """
 
     def __init__(
@@ -65,19 +83,47 @@ class Displays:
         load: Callable[[int], np.ndarray],
         leads: Callable[[int, int], bool],
         always: bool = False,
+        ahead: bool = False,
     ):
-        self._load, self._leads, self._always = load, leads, always
+        self._load, self._leads, self._always, self._ahead = load, leads, always, ahead
         self._pictures: dict[int, _Picture] = {}
         self._steps: dict[int, np.ndarray] = {}
+        self._greys: dict[int, np.ndarray] = {}
+        self._last: int | None = None
+        self._begun: tuple[_Window, Callable[[], np.ndarray | None]] | None = None
 
     def mask(self, number: int) -> np.ndarray | None:
         """(height, width) bool, True at a display; None if there is no display.
 
         It depends on the REACH pictures before and after alone.
         """
+        window, begun = self._window(number), self._begun
+        found = begun[1]() if begun else None
+        if begun is None or not begun[0].is_same(window):
+            found = self._searched(window)
+        follows = self._last is not None and number == self._last + 1
+        self._last, self._begun = number, None
+        if self._ahead and follows and self._leads(number, number + 1):
+            later = self._window(number + 1)
+            self._begun = later, threads.started(lambda: self._searched(later), "displays")
+        return found
+
+    def _window(self, number: int) -> _Window:
+        """The pictures up to REACH before and after one, as far as motion leads to them."""
+        ends = []
+        for way in (-1, 1):
+            steps = range(1, REACH + 1)
+            there = takewhile(lambda k, way=way: self._leads(number, number + way * k), steps)
+            ends.append(number + way * max(there, default=0))
+        return _Window(number, {n: self._load(n) for n in range(ends[0], ends[1] + 1)})
+
+    def _searched(self, window: _Window) -> np.ndarray | None:
+        """The mask of the picture in the middle; by one thread at a time."""
+        number, self._greys = window.number, window.greys
         self._forget(number)
         here = self._picture(number)
-        back, ahead = self._run(number, -1), self._run(number, 1)
+        back = self._steps_between(range(min(window.greys), number))[::-1]
+        ahead = self._steps_between(range(number, max(window.greys)))
         if len(back) + len(ahead) < _STILL:
             return None
         count, often = self._standing(number, back, ahead)
@@ -119,20 +165,15 @@ class Displays:
 
     def _picture(self, number: int) -> _Picture:
         if number not in self._pictures:
-            self._pictures[number] = _Picture.of(self._load(number))
+            self._pictures[number] = _Picture.of(self._greys[number])
         return self._pictures[number]
 
-    def _run(self, number: int, way: int) -> list[np.ndarray]:
-        """The unchanged pixels (uint8, 0 or 1) of up to REACH steps from a picture in its shot."""
-        found = []
-        for k in range(1, REACH + 1):
-            if not self._leads(number, number + way * k):
-                break
-            first = min(number + way * k, number + way * (k - 1))
-            if first not in self._steps:
-                self._steps[first] = self._step(first)
-            found.append(self._steps[first])
-        return found
+    def _steps_between(self, numbers: range) -> list[np.ndarray]:
+        """The unchanged pixels (uint8, 0 or 1) of the steps from these pictures to their next."""
+        for number in numbers:
+            if number not in self._steps:
+                self._steps[number] = self._step(number)
+        return [self._steps[number] for number in numbers]
 
     def _step(self, number: int) -> np.ndarray:
         """The pixels that do not change from a picture to the next."""

@@ -81,6 +81,7 @@ class Exposures:
         self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
         self._average, self._images = Average(blur.device), TexturePool(blur.device)
         self._views = KeptViews()
+        self._in_software = blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
         self._used: set[str] = set()
         self.shots: ShotReader[Thumbnail] | None = None
@@ -128,7 +129,7 @@ class Exposures:
             is_cut=is_cut if self._cuts else None,
             known_cuts=self._known_cuts,
             change=change if self._fill else None,
-            reach=window(size, self._motion),
+            reach=window(size, self._motion) + (not self._in_software),  # for the next mask
             flash=self._flash,
             tolerance=self._tolerance,
         )
@@ -148,8 +149,7 @@ class Exposures:
         Without a GPU each stage is submitted by itself, so that the adapter works on it while the
         next one is recorded.
         """
-        in_software = self.device.adapter_info["adapter_type"] == gpu.SOFTWARE
-        return nullcontext() if in_software else gpu.gathered(self.device)
+        return nullcontext() if self._in_software else gpu.gathered(self.device)
 
     def light(
         self, shots: Shots[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]

@@ -55,7 +55,8 @@ class VideoFrames:
             light = None if self._planes.expansion else self._light
             self._source = VideoMotion(motion, shots, blur.device, wants_depth, light)
         self._holdout = holdout or Holdout(displays=False)
-        self._held = self._holdout.of(shots)
+        has_gpu = blur.device.adapter_info["adapter_type"] != gpu.SOFTWARE
+        self._held = self._holdout.of(shots, ahead=has_gpu)  # otherwise all cores have work
         self.alone: set[int] = set()
         self.unfollowed: set[int] = set()
         self._mask: View | None = None

@@ -39,9 +39,11 @@ class Holdout:
     always: bool = False
     shares: dict[int, float] = field(default_factory=dict)
 
-    def of(self, shots: Shots[Thumbnail]) -> Held:
-        """Masks of pictures, by their indices."""
-        found = Displays(lambda index: shots[index].content.grey, shots.moves_on, self.always)
+    def of(self, shots: Shots[Thumbnail], ahead: bool = False) -> Held:
+        """Masks of pictures, by their indices. `ahead`: see Displays."""
+        found = Displays(
+            lambda index: shots[index].content.grey, shots.moves_on, self.always, ahead
+        )
 
         def held(index: int) -> np.ndarray | None:
             display = found.mask(index) if self.displays else None
