@@ -21,7 +21,7 @@ from wgmb.viewer.panel.sections import at_pace, in_part
 from wgmb.viewer.panel.widgets import shortened
 from wgmb.viewer.state.state import video_time
 from wgmb.viewer.state.video_time import described
-from wgmb.viewer.subjects.video_exposure import exposure_of, picture_at
+from wgmb.viewer.subjects.video_exposure import ClockedTimes, exposure_of
 from wgmb.viewer.subjects.video_motion import PictureFinding
 
 pytestmark = pytest.mark.fast
@@ -155,7 +155,8 @@ def chain(numbers, cuts=(), without=()):
 
 def made(known, frame, fps=48, degrees=180, speed=Fraction(1), count=20):
     moment = OutputFrame(frame, Fraction(frame, fps), Fraction(1, fps))
-    return exposure_of(shown_at(range(count)), Clock(speed=speed), moment, Shutter(degrees), known)
+    times = ClockedTimes(shown_at(range(count)), Clock(speed=speed))
+    return exposure_of(times, moment, Shutter(degrees), known)
 
 
 def test_an_exposure_is_made_of_the_pictures_whose_cells_it_meets():
@@ -188,11 +189,11 @@ def test_what_is_not_known_yet_is_asked_for():
 
 
 def test_the_picture_at_a_time_is_found_exactly():
-    times = shown_at(range(0, 40, 2))
+    times = ClockedTimes(shown_at(range(0, 40, 2)), Clock())
     for frame, want in [(0, 0), (1, 0), (2, 1), (3, 1), (39, 19)]:
-        assert (
-            picture_at(times, Clock(), OutputFrame(frame, Fraction(frame, 48), Fraction(1))) == want
-        )
+        assert times.shown_at(frame / 48) == want
+    rounded = ClockedTimes(shown_at(range(0, 40, 2)), Clock(), tolerance=1 / 480)
+    assert rounded.shown_at(2 / 48 - 1 / 500) == 1 and rounded.shown_at(2 / 48 - 1 / 400) == 0
 
 
 # ---- options that do not fit ----------------------------------------------------------------

@@ -33,13 +33,15 @@ class ExposureSum:
         self._images = TexturePool(device)
         self._sum = WeightedSum(device)
 
-    def texture(self, size: tuple[int, int], parts: Iterable[Part]) -> wgpu.GPUTexture:
+    def texture(
+        self, size: tuple[int, int], parts: Iterable[Part], timing: Clock | None = None
+    ) -> wgpu.GPUTexture:
         """The exposure of pictures of `size` (width, height): linear light, rgba32float.
 
-        The next call overwrites it.
+        The next call overwrites it. `timing`: see `draw`.
         """
         output = self._images.texture("exposure", size, "rgba32float")
-        self.draw(parts, output)
+        self.draw(parts, output, timing)
         return output
 
     def alone(self, part: Part) -> wgpu.GPUTexture:

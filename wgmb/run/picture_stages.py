@@ -81,9 +81,12 @@ class ClipPictures:
             raise
         return _coded(source.rgba)
 
-    def same_shot(self, index: int, other: int) -> bool:
-        """As `moves_on`: a frame stands for its own interval alone."""
-        return self.moves_on(index, other)
+    def neighbour(self, index: int, side: int) -> int | None:
+        """The frame before (-1) or after (1) another one, if motion leads there.
+
+        A frame stands for its own interval alone.
+        """
+        return index + side if self.moves_on(index, index + side) else None
 
     def moves_on(self, index: int, other: int) -> bool:
         """True if both frames are there, and neither a cut nor a gap lies between them."""
@@ -231,7 +234,7 @@ class PictureStages(Stages):
         with self._reading:
             exposures, pictures, textures = self._of(source.view)
             cells = self._cells(source.number, pictures)
-            exposure = Exposure(exposures, pictures, textures, cells)
+            exposure = Exposure(exposures, textures, cells)
             is_coded = pictures[source.number].content.coded.coding.bits == 8
             if self._road.bits and is_coded:
                 planes = exposure.coded(_samples(self._road.bits)).planes
@@ -257,11 +260,8 @@ class PictureStages(Stages):
         if self._shutter.rolling is not None:
             return [Cell(here, 1.0, self._shutter)]
 
-        def neighbour(number: int, side: int) -> int | None:
-            return number + side if pictures.moves_on(number, number + side) else None
-
         step = 1.0 if self._conversion is None else float(self._conversion.step)
-        return cells_in_shot(here, neighbour, float, float(self._at), step, self._shutter)
+        return cells_in_shot(here, pictures.neighbour, float, float(self._at), step, self._shutter)
 
     def _of(self, view: str | None) -> tuple[Exposures, ClipPictures, VideoFrames]:
         """The exposures of a view, with its pictures."""

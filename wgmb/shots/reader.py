@@ -39,8 +39,8 @@ class Shots(Protocol[T]):
         """A picture that is there; KeyError for others."""
         ...
 
-    def same_shot(self, index: int, other: int) -> bool:
-        """True if two pictures are there, and no cut lies between them."""
+    def neighbour(self, index: int, side: int) -> int | None:
+        """The picture before (-1) or after (1) another one in its shot; None if there is none."""
         ...
 
     def moves_on(self, index: int, other: int) -> bool:
@@ -112,15 +112,16 @@ class ShotReader(Generic[T]):
         self.read_beyond(at + interval * max(shutter.span[1], 0.0))
         here = self._index_at(at)
 
-        def neighbour(index: int, side: int) -> int | None:
-            return index + side if self.same_shot(index, index + side) else None
-
         def time(index: int) -> float:
             return self._kept[index].time
 
-        found = cells_in_shot(here, neighbour, time, at, interval, shutter)
+        found = cells_in_shot(here, self.neighbour, time, at, interval, shutter)
         self._forget_before(min(found[0].index, here) - self._reach)
         return found
+
+    def neighbour(self, index: int, side: int) -> int | None:
+        """The picture before (-1) or after (1) another one in its shot; None if none is kept."""
+        return index + side if self.same_shot(index, index + side) else None
 
     def same_shot(self, index: int, other: int) -> bool:
         """True if two pictures are kept, and no cut lies between them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,6 +17,7 @@ from ..color.coding import CodedPicture, Coding
 from ..errors import InputError
 from ..exposure import Cell
 from ..gpu.textures import KeptViews, TexturePool
+from ..gpu.timing import Clock as PassClock
 from ..methods.contract import reach_of
 from ..pipeline.blur import Blur
 from ..pipeline.exposure_sum import ExposureSum, Part
@@ -32,7 +33,7 @@ from .planes import Average, Planes, averages
 from .read.reader import VideoReader
 from .thumbnail import Thumbnail, change, is_cut
 
-_BEFORE = 14  # pictures decoded before the first exposure, which its motion may depend on
+BEFORE = 14  # pictures decoded before the first exposure, which its motion may depend on
 
 
 class ExposureKeywords(TypedDict, total=False):
@@ -78,8 +79,8 @@ class Exposures:
         self._flash, self._tolerance = flash, tolerance
         self._blur, self._motion = blur, motion
         self._at_edges = at_edges
-        self._sum, self._planes = ExposureSum(blur.device), planes or Planes(blur.device)
-        self._average, self._images = Average(blur.device), TexturePool(blur.device)
+        self._planes = planes or Planes(blur.device)
+        self._light, self._average = ExposedLight(self._planes), Average(blur.device)
         self._views = KeptViews()
         self._in_software = blur.device.adapter_info["adapter_type"] == gpu.SOFTWARE
         self._fill, self._cuts, self._known_cuts = fill, cuts, known_cuts
@@ -136,7 +137,7 @@ class Exposures:
         self._frames = frames = self.frames(shots)
         for frame in wanted:
             cells = shots.cells(float(frame.time), float(frame.interval), shutter)
-            yield frame, Exposure(self, shots, frames, cells)
+            yield frame, Exposure(self, frames, cells)
 
     def frames(self, shots: Shots[Thumbnail]) -> VideoFrames:
         """The textures of pictures, for Exposure."""
@@ -151,45 +152,73 @@ class Exposures:
         """
         return nullcontext() if self._in_software else gpu.gathered(self.device)
 
-    def light(
-        self, shots: Shots[Thumbnail], frames: VideoFrames, cells: Sequence[Cell]
-    ) -> wgpu.GPUTexture:
+    def light(self, frames: VideoFrames, cells: Sequence[Cell]) -> wgpu.GPUTexture:
         """The exposure of these cells as linear light (rgba32float)."""
-        light, changes = self._blurred(shots, frames, cells)
+        return self._light(frames, cells, self._blurs(frames))
+
+    def coded(self, frames: VideoFrames, cells: Sequence[Cell], coding: Coding) -> CodedPicture:
+        """The exposure of these cells in planes."""
+        plain = self._motion is None and not self._planes.expansion
+        first = frames.shots[cells[0].index].content.coded
+        if plain and averages(first.coding, coding):
+            pictures = [frames.shots[cell.index].content.coded for cell in cells]
+            return self._average(pictures, [cell.share for cell in cells], coding)
+        light, changes = self._light.blurred(frames, cells, self._blurs(frames), is_coded=True)
+        encoder = gpu.encoder(self.device, "encode")
+        return self._planes.encode(encoder, self._views.of(light), coding, changes)
+
+    def _blurs(self, frames: VideoFrames) -> Callable[[Cell], Blur]:
+        """The Blur of each cell."""
+
+        def blur_of(cell: Cell) -> Blur:
+            blur = self._blur
+            if self._at_edges is not None and frames.has_edges(cell):
+                blur = self._at_edges
+            self._used.add(blur.method.name)
+            return blur
+
+        return blur_of
+
+
+class ExposedLight:
+    """Makes the light of exposures of the pictures of VideoFrames, whose light `planes` made."""
+
+    def __init__(self, planes: Planes):
+        self._planes, self._device = planes, planes.device
+        self._sum, self._images = ExposureSum(planes.device), TexturePool(planes.device)
+        self._views = KeptViews()
+
+    def __call__(
+        self,
+        frames: VideoFrames,
+        cells: Sequence[Cell],
+        blur_of: Callable[[Cell], Blur],
+        timing: PassClock | None = None,
+    ) -> wgpu.GPUTexture:
+        """The exposure of these cells, each by its Blur, as linear light (rgba32float).
+
+        The next call overwrites it. `timing`: see ExposureSum.
+        """
+        light, changes = self.blurred(frames, cells, blur_of, timing)
         size, steps = (light.size[0], light.size[1]), []
         if changes is not None:
             steps.append(("changed", frames.changing.add))
         if self._planes.expansion:
             steps.append(("compressed", self._planes.compress))
         for name, step in steps:
-            encoder = gpu.encoder(self.device, name)
+            encoder = gpu.encoder(self._device, name)
             output = self._images.texture(name, size, "rgba32float")
             step(encoder, self._views.of(light), self._views.of(output))
-            gpu.hand_in(self.device, encoder)
+            gpu.hand_in(self._device, encoder)
             light = output
         return light
 
-    def coded(
+    def blurred(
         self,
-        shots: Shots[Thumbnail],
         frames: VideoFrames,
         cells: Sequence[Cell],
-        coding: Coding,
-    ) -> CodedPicture:
-        """The exposure of these cells in planes."""
-        plain = self._motion is None and not self._planes.expansion
-        if plain and averages(shots[cells[0].index].content.coded.coding, coding):
-            pictures = [shots[cell.index].content.coded for cell in cells]
-            return self._average(pictures, [cell.share for cell in cells], coding)
-        light, changes = self._blurred(shots, frames, cells, is_coded=True)
-        encoder = gpu.encoder(self.device, "encode")
-        return self._planes.encode(encoder, self._views.of(light), coding, changes)
-
-    def _blurred(
-        self,
-        shots: Shots[Thumbnail],
-        frames: VideoFrames,
-        cells: Sequence[Cell],
+        blur_of: Callable[[Cell], Blur],
+        timing: PassClock | None = None,
         is_coded: bool = False,
     ) -> tuple[wgpu.GPUTexture, LightChanges | None]:
         """The same as it is blurred: expanded, and without changes of light.
@@ -199,20 +228,17 @@ class Exposures:
         changed: list[Cell] = []
 
         def part(cell: Cell) -> Part:
-            blur = self._blur
-            if self._at_edges is not None and frames.has_edges(cell):
-                blur = self._at_edges
-            self._used.add(blur.method.name)
+            blur = blur_of(cell)
             found = frames.in_shot(cell.index, blur)
             if frames.change(cell, not changed):
                 changed.append(cell)
             return cell, found, blur
 
-        size = shots[cells[0].index].content.coded.size
+        size = frames.shots[cells[0].index].content.coded.size
         if is_coded and len(cells) == 1:
             light = self._sum.alone(part(cells[0]))
         else:
-            light = self._sum.texture(size, map(part, cells))
+            light = self._sum.texture(size, map(part, cells), timing)
         return light, frames.changing.changes(size) if changed else None
 
 
@@ -251,7 +277,7 @@ class VideoBlur(Exposures):
             + Fraction(shutter.span[0]) * wanted[0].interval * self.clock.speed
         )
         first = int(np.searchsorted(self.reader.times.seconds, float(opens)))
-        first, none = max(first - _BEFORE, 0), True
+        first, none = max(first - BEFORE, 0), True
         for number, picture in self.reader.pictures(first):
             none = False
             yield Picture(float(self.clock.out(times[number])), Thumbnail(picture), number)
@@ -267,19 +293,18 @@ class Exposure:
     """An output frame, made on request in the requested form."""
 
     _run: Exposures
-    _shots: Shots[Thumbnail]
     _frames: VideoFrames
     _cells: Sequence[Cell]
 
     def light(self) -> wgpu.GPUTexture:
         """As linear light (rgba32float)."""
         with self._run.in_one():
-            return self._run.light(self._shots, self._frames, self._cells)
+            return self._run.light(self._frames, self._cells)
 
     def coded(self, coding: Coding) -> CodedPicture:
         """In the planes of a video; with a GPU they may be on their way when this returns."""
         with self._run.in_one():
-            return self._run.coded(self._shots, self._frames, self._cells, coding)
+            return self._run.coded(self._frames, self._cells, coding)
 
 
 class ExposedPicture(Protocol):

@@ -14,10 +14,11 @@ from ..gpu.textures import KeptViews, TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
 from ..shots.motion import MotionSource
+from ..shots.picture import Picture
 from ..shots.reader import Shots
 from .changing_light import ChangingLight, Surroundings, shares_of
 from .holdouts import Holdout
-from .motion import VideoMotion
+from .motion import MotionTextures, VideoMotion
 from .planes import Planes
 from .ragged import KEPT
 from .thumbnail import Thumbnail, is_same
@@ -29,11 +30,12 @@ LIGHTS = 6  # pictures kept as light: a frame and its neighbours, the next one, 
 class VideoFrames:
     """Textures of the pictures of `shots`, on the device of the Blur that takes them.
 
-    `motion`: where motion comes from, or None. `holdout`: areas that stay sharp, where there is
-    motion. `planes`: make their light; motion is searched in light that is not expanded.
-    `changing`: adds changes of light, for all that blur pictures of `shots`. Numbers of pictures
-    that are copied, as none of their shot is beside them to find motion from, are `alone`; those
-    with a place whose motion was not found are `unfollowed`.
+    `motion`: where motion comes from, or None. `known_motion`: instead, motion that was found
+    already. `holdout`: areas that stay sharp, where there is motion. `planes`: make their light;
+    motion is searched in light that is not expanded. `changing`: adds changes of light, for all
+    that blur pictures of `shots`. Numbers of pictures that are copied, as none of their shot is
+    beside them to find motion from, are `alone`; those with a place whose motion was not found are
+    `unfollowed`.
     """
 
     def __init__(
@@ -44,14 +46,15 @@ class VideoFrames:
         holdout: Holdout | None = None,
         planes: Planes | None = None,
         changing: ChangingLight | None = None,
+        known_motion: MotionTextures | None = None,
     ):
-        self._shots, self._blur, self._device = shots, blur, blur.device
+        self.shots, self._blur, self._device = shots, blur, blur.device
         self._planes, self._images = planes or Planes(blur.device), TexturePool(blur.device)
         self._frame_of, self._views = gpu.SizeBindings(blur.device), KeptViews()
         self.changing = changing or ChangingLight(blur.device)
-        wants_depth = "depth" in blur.method.needs | blur.method.uses
-        self._source: VideoMotion | None = None
+        self._source = known_motion
         if motion is not None:
+            wants_depth = "depth" in blur.method.needs | blur.method.uses
             light = None if self._planes.expansion else self._light
             self._source = VideoMotion(motion, shots, blur.device, wants_depth, light)
         self._holdout = holdout or Holdout(displays=False)
@@ -61,26 +64,27 @@ class VideoFrames:
         self.unfollowed: set[int] = set()
         self._mask: View | None = None
         self._lights: dict[int, str] = {}  # names of textures by index, the latest last
-        self._frames: dict[int, tuple[int, FrameViews]] = {}  # by the place of their textures
-        self._same: dict[int, bool] = {}  # whether a picture is that before it, by index
+        self._frames: dict[int, tuple[Picture[Thumbnail], FrameViews]] = {}  # by their places
+        self._same: dict[tuple[int, int], bool] = {}  # whether two pictures are, by their indices
 
     def in_shot(self, index: int, blur: Blur | None = None) -> FrameInShot:
         """A picture, between its neighbours if the method takes them, of `blur` if not of its own.
 
         Their textures may be overwritten once two others have been requested.
         """
-        number = self._shots[index].number
+        number = self.shots[index].number
         if self._is_still(index):
             return FrameInShot(FrameViews(color=self._light_view(index)), number=number)
-        wanted = [index]
+        before = after = None
         method = (blur or self._blur).method
         takes = method.needs | method.uses
         if self._source is not None and "neighbours" in takes:
-            wanted = [i for i in (index - 1, index, index + 1) if self._shots.moves_on(index, i)]
-        views = {i: self._frame(i, "depth" in takes) for i in wanted}
-        near = (views.get(i) for i in (index - 1, index + 1))
-        before, after = (one if one is not None and one.has_vectors else None for one in near)
-        return FrameInShot(views[index], before, after, number)
+            before, after = self._led_to(index)
+        wanted = [i for i in (before, index, after) if i is not None]
+        views = {i: self.views(i, "depth" in takes) for i in wanted}
+        near = (None if i is None else views[i] for i in (before, after))
+        previous, next = (one if one is not None and one.has_vectors else None for one in near)
+        return FrameInShot(views[index], previous, next, number)
 
     def change(self, cell: Cell, begins: bool) -> bool:
         """Submit the changes of light in the part `cell` of an exposure.
@@ -90,12 +94,11 @@ class VideoFrames:
         index = cell.index
         if cell.shutter.degrees <= 0 or self._is_still(index):
             return False
-        frame = self._frame(index)
+        frame = self.views(index)
         if frame.motion is None:
             return False
-        near = tuple(i if self._shots.moves_on(index, i) else None for i in (index - 1, index + 1))
-        factors = self._factors(index)
-        surroundings = Surroundings((near[0], index, near[1]), factors, frame.motion, frame.holdout)
+        (before, after), factors = self._led_to(index), self._factors(index)
+        surroundings = Surroundings((before, index, after), factors, frame.motion, frame.holdout)
         encoder = gpu.encoder(self._device, "changing light")
         shares = shares_of(cell.shutter, factors)
         self.changing.encode(encoder, self._light, surroundings, shares, cell.share, begins)
@@ -114,29 +117,43 @@ class VideoFrames:
         """True if motion leads to pictures beside one, and all of them are the same."""
         if self._source is None:
             return False
-        near = [side for side in (0, 1) if self._shots.moves_on(index - 1 + side, index + side)]
-        return bool(near) and all(self._repeats(index + side) for side in near)
+        before, after = self._led_to(index)
+        pairs = (before, index), (index, after)
+        near = [(a, b) for a, b in pairs if a is not None and b is not None]
+        return bool(near) and all(self._are_same(a, b) for a, b in near)
 
-    def _repeats(self, index: int) -> bool:
+    def _led_to(self, index: int) -> tuple[int | None, int | None]:
+        """The pictures before and after one, as far as motion leads there."""
+        before, after = (self.shots.neighbour(index, side) for side in (-1, 1))
+        return (
+            before if before is not None and self.shots.moves_on(index, before) else None,
+            after if after is not None and self.shots.moves_on(index, after) else None,
+        )
+
+    def _are_same(self, before: int, index: int) -> bool:
         """True if a picture is the same as the one before it; compared once."""
-        if index not in self._same:
-            for old in [i for i in self._same if abs(i - index) > LIGHTS]:
+        if (before, index) not in self._same:
+            for old in [pair for pair in self._same if abs(pair[1] - index) > LIGHTS]:
                 del self._same[old]
-            before, here = (self._shots[i].content for i in (index - 1, index))
-            self._same[index] = is_same(before, here)
-        return self._same[index]
+            one, here = (self.shots[i].content for i in (before, index))
+            self._same[before, index] = is_same(one, here)
+        return self._same[before, index]
 
-    def _frame(self, index: int, depth: bool = False) -> FrameViews:
+    def _place(self, index: int) -> int:
+        return index % KEPT if self._source is None else self._source.place(index)
+
+    def views(self, index: int, depth: bool = False) -> FrameViews:
         """The views of one picture. `depth`: whether it is wanted, if it is found only then."""
-        of, kept = self._frames.get(index % KEPT, (index, None))
+        picture, place = self.shots[index], self._place(index)
+        of, kept = self._frames.get(place, (picture, None))
         light = self._light_view(index)
-        if kept is None or of != index or kept.color.texture is not light.texture:
+        if kept is None or of is not picture or kept.color.texture is not light.texture:
             kept = self._moving(index, light)
         if depth and kept.depth is None and kept.motion is not None and self._source is not None:
             found = self._source.depth(index)
             if found is not None:
                 kept = replace(kept, depth=self._views.of(found), key=object())
-        self._frames[index % KEPT] = index, kept
+        self._frames[place] = picture, kept
         return kept
 
     def _moving(self, index: int, light: View) -> FrameViews:
@@ -144,14 +161,14 @@ class VideoFrames:
         found = None if self._source is None else self._source.textures(index)
         if found is None:
             if self._source is not None:
-                self.alone.add(self._shots[index].number)
+                self.alone.add(self.shots[index].number)
             return FrameViews(color=light, key=object())
         held = self._held(index)
         if self._source is not None and self._source.is_unfollowed(index, held):
-            self.unfollowed.add(self._shots[index].number)
+            self.unfollowed.add(self.shots[index].number)
         (motion, depth), factors = found, self._factors(index)
         if factors != (1.0, 1.0):
-            motion = self._paced(motion, f"paced {index % KEPT}", factors)
+            motion = self._paced(motion, f"paced {self._place(index)}", factors)
         return FrameViews(
             color=light,
             motion=self._views.of(motion),
@@ -162,7 +179,7 @@ class VideoFrames:
 
     def _light(self, index: int) -> wgpu.GPUTexture:
         """The texture of one picture, kept until others need its place."""
-        coded = self._shots[index].content.coded
+        coded = self.shots[index].content.coded
         if known := index in self._lights:
             self._lights[index] = self._lights.pop(index)
         else:
@@ -185,17 +202,18 @@ class VideoFrames:
         if plane is None:
             return None
         if plane is not self._holdout.mask:
-            return self._images.upload(f"display {index % KEPT}", plane, texel)
+            return self._images.upload(f"display {self._place(index)}", plane, texel)
         if self._mask is None:
             self._mask = self._images.upload("holdout", plane, texel)
         return self._mask
 
     def _factors(self, index: int) -> tuple[float, float]:
         """See exposure.evened."""
-        near = [i for i in (index - 1, index, index + 1) if self._shots.same_shot(index, i)]
-        times = np.array([self._shots[i].time for i in near])
-        back, ahead = (self._shots.moves_on(index, i) for i in (index - 1, index + 1))
-        return evened(times, near.index(index), (back, ahead), self._shots.tolerance)
+        before, after = (self.shots.neighbour(index, side) for side in (-1, 1))
+        near = [i for i in (before, index, after) if i is not None]
+        times = np.array([self.shots[i].time for i in near])
+        back, ahead = (i is not None for i in self._led_to(index))
+        return evened(times, near.index(index), (back, ahead), self.shots.tolerance)
 
     def _paced(
         self, motion: wgpu.GPUTexture, name: str, factors: tuple[float, float]

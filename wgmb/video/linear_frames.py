@@ -1,4 +1,4 @@
-"""The pictures of a video as arrays of linear light."""
+"""The pictures of a video in any order, as they are coded, and as arrays of linear light."""
 
 from __future__ import annotations
 
@@ -16,15 +16,39 @@ _READ_AHEAD = 2  # coded pictures
 _NEAR = 48  # pictures that are decoded rather than sought
 
 
+class CodedPictures:
+    """Decodes a video's pictures, in any order."""
+
+    def __init__(self, reader: VideoReader):
+        self._reader = reader
+        self._going: Iterator[tuple[int, CodedPicture]] = iter(())
+        self._reached = len(reader)  # number of the picture that `_going` gave last
+        self._pending: tuple[int, CodedPicture] | None = None
+
+    def at(self, number: int) -> CodedPicture | None:
+        """One picture by its number; None if it cannot be decoded. Quick for the next ones."""
+        if not self._reached < number <= self._reached + _NEAR:
+            self._going, self._pending = self._reader.pictures(number), None
+        while True:
+            found = self._pending or next(self._going, None)
+            self._pending = None
+            if found is None:
+                self._reached = len(self._reader)
+                return None
+            if found[0] > number:
+                self._pending, self._reached = found, number
+                return None
+            self._reached = found[0]
+            if found[0] == number:
+                return found[1]
+
+
 class VideoPictures:
     """Decodes a video's pictures, and makes them linear on the GPU, by `planes`."""
 
     def __init__(self, reader: VideoReader, planes: Planes):
         self.reader, self.planes = reader, planes
-        self._images = TexturePool(planes.device)
-        self._going: Iterator[tuple[int, CodedPicture]] = iter(())
-        self._reached = len(reader)  # number of the picture that `_going` gave last
-        self._pending: tuple[int, CodedPicture] | None = None
+        self._images, self._coded = TexturePool(planes.device), CodedPictures(reader)
 
     def light(self, picture: CodedPicture) -> np.ndarray:
         """(height, width, 3, or 4 with alpha) float16, linear, premultiplied."""
@@ -44,22 +68,5 @@ class VideoPictures:
 
     def at(self, number: int) -> np.ndarray | None:
         """One picture by its number; None if it cannot be decoded. Quick for the next ones."""
-        coded = self.coded(number)
+        coded = self._coded.at(number)
         return None if coded is None else self.light(coded)
-
-    def coded(self, number: int) -> CodedPicture | None:
-        """The same as it is stored."""
-        if not self._reached < number <= self._reached + _NEAR:
-            self._going, self._pending = self.reader.pictures(number), None
-        while True:
-            found = self._pending or next(self._going, None)
-            self._pending = None
-            if found is None:
-                self._reached = len(self.reader)
-                return None
-            if found[0] > number:
-                self._pending, self._reached = found, number
-                return None
-            self._reached = found[0]
-            if found[0] == number:
-                return found[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import wgpu
 
@@ -21,6 +21,30 @@ from .thumbnail import Thumbnail
 from .unfollowed import is_unfollowed
 
 Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]
+
+
+class MotionTextures(Protocol):
+    """The motion of pictures in time, by their indices, as textures."""
+
+    def place(self, index: int) -> int:
+        """The place of a picture's textures, 0 to KEPT - 1, which the next one there overwrites."""
+        ...
+
+    def textures(self, index: int) -> Textures | None:
+        """Motion (rgba32float) of a picture; depth (r32float), if it is known; None if alone."""
+        ...
+
+    def depth(self, index: int) -> wgpu.GPUTexture | None:
+        """The depth of a picture whose motion was given without; None where there is none."""
+        ...
+
+    def change(self, index: int) -> float:
+        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+        ...
+
+    def is_unfollowed(self, index: int, held: Any) -> bool:
+        """Return True if a place of a picture was not followed (see unfollowed.py)."""
+        ...
 
 
 class VideoMotion(ShotMotion):
@@ -51,6 +75,10 @@ class VideoMotion(ShotMotion):
         self._grey = searched.grey
         self._device, self._images = device, TexturePool(device)
         self._ragged = RaggedMotion(device)
+
+    def place(self, index: int) -> int:
+        """The place of a picture's textures, as in RaggedMotion."""
+        return index % KEPT
 
     def textures(self, index: int) -> Textures | None:
         """Motion (rgba32float) of a picture; depth (r32float), if it is known; None if alone.

@@ -23,8 +23,7 @@ from ...threads import begin
 from ...video.read.reader import VideoReader
 from .video_motion import MotionRequest, PictureFinder, PictureFinding
 
-_MEMORY = 1 << 30  # bytes of motion kept
-_FEWEST = 48  # pictures whose motion is kept at least
+_MEMORY = 1 << 30  # bytes of motion kept, if an exposure does not need more
 _POLL = 0.2  # seconds after which the thread looks whether it should end
 
 
@@ -52,6 +51,8 @@ class MotionThread:
         self._changed = threading.Event()
         self._ended = threading.Event()
         self._wanted: tuple[int, ...] = ()
+        self._needed = 0
+        self._bytes = 1  # of the largest finding
         self._making: tuple[int, float] | None = None
         self._thread = begin(lambda: self._work(beside, motion), "motion")
 
@@ -62,11 +63,14 @@ class MotionThread:
                 self._known.move_to_end(number)
             return self._known.get(number)
 
-    def want(self, numbers: tuple[int, ...]) -> None:
-        """Make these next, in this order, instead of earlier requests."""
+    def want(self, numbers: tuple[int, ...], needed: int) -> None:
+        """Make these next, in this order, instead of earlier requests.
+
+        The first ones are `needed`; of the others, as many are made as there is memory for.
+        """
         with self._lock:
-            if numbers != self._wanted:
-                self._wanted = numbers
+            if (numbers, needed) != (self._wanted, self._needed):
+                self._wanted, self._needed = numbers, needed
                 self._changed.set()
 
     @property
@@ -99,7 +103,8 @@ class MotionThread:
         """The next picture that is wanted and not known, until the thread is to end."""
         while not self._ended.is_set():
             with self._lock:
-                number = next((n for n in self._wanted if n not in self._known), None)
+                soon = self._wanted[: self._most]
+                number = next((n for n in soon if n not in self._known), None)
                 if number is not None:
                     self._making = number, time.perf_counter()
                 self._changed.clear()
@@ -110,7 +115,11 @@ class MotionThread:
 
     def _keep(self, number: int, known: PictureFinding) -> None:
         self._known[number] = known
-        size = sum(a.nbytes for a in (known.motion, known.depth, known.holdout) if a is not None)
-        most = max(_MEMORY // max(size, 1), _FEWEST)
-        while len(self._known) > most:
+        self._bytes = max(self._bytes, known.bytes)
+        while len(self._known) > self._most:
             self._known.popitem(last=False)
+
+    @property
+    def _most(self) -> int:
+        """Findings that are kept."""
+        return max(_MEMORY // self._bytes, self._needed)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -12,37 +11,41 @@ import wgpu
 
 from ... import gpu
 from ...color.coding import Coding
+from ...color.highlights import Expansion
 from ...color.spaces import ColorConfig, ColorSpace
-from ...errors import InputError
-from ...exposure import Cell, evened
-from ...frame import Frame
+from ...exposure import Cell
 from ...gpu.textures import TexturePool
 from ...gpu.timing import Clock
-from ...gpu_frame.residency import padded
 from ...methods import METHODS
 from ...pipeline.blur import Blur
-from ...pipeline.exposure_sum import ExposureSum
 from ...shutter import Shutter
-from ...video.changing_light import ChangingLight, Surroundings, shares_of
+from ...video.exposures import ExposedLight
+from ...video.gpu_frames import VideoFrames
 from ...video.holdouts import STATIC, holdout_of
-from ...video.linear_frames import VideoPictures
 from ...video.planes import Planes
-from ...video.read.reader import VideoReader
 from ..state.allowed import check_video
 from ..state.files import reader_of
 from ..state.state import State
 from ..state.video_time import described, output, output_frame
 from .motion_thread import MotionThread
-from .video_exposure import Knowledge, VideoExposure, exposure_of, reach
-from .video_motion import MotionRequest, PictureFinding
+from .video_exposure import (
+    ClockedTimes,
+    Knowledge,
+    KnownHoldout,
+    KnownMotion,
+    KnownShots,
+    VideoExposure,
+    exposure_of,
+    reach,
+)
+from .video_motion import MotionRequest
 
 _PASSES = frozenset({"color", "motion", "depth"})
-_LIGHTS = "light before", "light here", "light after"  # names of textures
 _AHEAD = 48  # pictures whose motion is made while playing
 
 
 class VideoSubject:
-    """A video: its output frames, as `wgmb blur` makes them.
+    """A video: its output frames, which wgmb/video exposes as for `wgmb blur`.
 
     Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
     when more is known. `finding`: the source of motion, and peculiarities of the file.
@@ -53,17 +56,16 @@ class VideoSubject:
         max_mb, masks, settings = state.input.max_mb, state.blur.holdout, state.video
         self._device, self._images = device, TexturePool(device)
         self._reader = reader_of(state.source, max_mb)
-        self._times = self._reader.times
         holdout_of([mask for mask in masks if mask != STATIC], self._reader)  # says what is wrong
-        request = MotionRequest(masks, settings.duplicates == "fill", state.input.cuts or "")
+        self._is_filled = settings.duplicates == "fill"
+        request = MotionRequest(masks, self._is_filled, state.input.cuts or "")
         self._maker = MotionThread(self._reader.path, max_mb, settings, device, request)
         self._moves = settings.flow != "none"
         self.finding = "\n".join([f"motion: {self._maker.how}", *self._reader.notes])
-        self._planes = Planes(device)
-        self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
-        self._changing = ChangingLight(device)
-        self._lit: dict[str, np.ndarray] = {}  # what textures of _LIGHTS hold
-        self._sum = ExposureSum(device)
+        self._shots = KnownShots(self._reader, self._times(state), self._maker.known)
+        self._motion = KnownMotion(device, self._maker.known) if self._moves else None
+        self._plain = Blur("tap", device=device)
+        self._expand(Expansion())
         self._state = state
         self._exposed: VideoExposure | None = None
         self._lacking: list[int] = []
@@ -111,7 +113,7 @@ class VideoSubject:
         Missing motion is requested, that of the first output frame first, and while playing also
         that of the pictures to come.
         """
-        beside = 1 if neighbours and self._moves else 0
+        beside = self._moves * (int(neighbours) + self._is_filled)
         known = lru_cache(maxsize=None)(self._maker.known)  # the same throughout: a thread adds
         asked: dict[int, None] = {}
         stamps, lacking = [], []
@@ -119,15 +121,16 @@ class VideoSubject:
             found = self._exposure(state, shutter, known)
             of_motion = [n for cell in found.cells for n in _near(cell.index, beside, known)]
             needed = [*found.lacking, *of_motion]
-            first, last = reach(self._times, output(state).clock, output_frame(state), shutter)
-            soon = range(max(first - beside, 0), min(last + beside + 1, len(self._times)))
+            first, last = reach(self._times(state), output_frame(state), shutter)
+            soon = range(max(first - beside, 0), min(last + beside + 1, len(self._reader)))
             asked |= dict.fromkeys([*needed, *sorted(soon, key=lambda n: abs(n - found.here))])
             lacking += [n for n in needed if known(n) is None]
             stamps.append(tuple(n for n in needed if known(n) is not None))
+        count = len(asked)
         if states[0].playing and asked:
             newest = max(asked)
-            asked |= dict.fromkeys(range(newest, min(newest + _AHEAD, len(self._times))))
-        self._maker.want(tuple(asked))
+            asked |= dict.fromkeys(range(newest, min(newest + _AHEAD, len(self._reader))))
+        self._maker.want(tuple(asked), count)
         self._lacking = list(dict.fromkeys(lacking))
         return stamps
 
@@ -172,10 +175,14 @@ class VideoSubject:
     def _exposure(
         self, state: State, shutter: Shutter, known: Knowledge | None = None
     ) -> VideoExposure:
-        clock = output(state).clock
-        return exposure_of(
-            self._times, clock, output_frame(state), shutter, known or self._maker.known
-        )
+        times, frame = self._times(state), output_frame(state)
+        return exposure_of(times, frame, shutter, known or self._maker.known, self._is_filled)
+
+    def _times(self, state: State) -> ClockedTimes:
+        """The times of its pictures in the output."""
+        reader, made = self._reader, output(state)
+        own = reader.times if made.frames.has_own_times else reader.exact_times
+        return ClockedTimes(own, made.clock, reader.tolerance / float(made.clock.speed))
 
     # ---- drawing --------------------------------------------------------------------------
 
@@ -187,33 +194,48 @@ class VideoSubject:
         expansion = state.video.expansion
         if expansion != self._planes.expansion:
             expansion.check_video(self._reader.path, self.coding)
-            self._planes = Planes(self._device, expansion)
-            self._frames = PictureFrames(self._reader, self._planes, self._maker.known)
-            self._changing = ChangingLight(self._device)
+            self._expand(expansion)
+        self._shots.retime(self._times(state))
         self._exposed = self._exposure(state, Shutter(0))
+
+    def _expand(self, expansion: Expansion) -> None:
+        """Make all light anew, expanded so."""
+        self._planes = planes = Planes(self._device, expansion)
+        held = KnownHoldout(known=self._maker.known)
+        self._frames = VideoFrames(
+            self._shots, self._plain, holdout=held, planes=planes, known_motion=self._motion
+        )
+        self._light = ExposedLight(planes)
 
     def passes(self) -> dict[str, wgpu.GPUTexture]:
         """The sharp picture and its layers; 0 everywhere as long as they are unknown."""
         assert self._exposed is not None
-        frame, images = self._frames(self._exposed.here), self._images
-        width, height = frame.size
-        motion = frame.motion if frame.motion is not None else np.zeros((height, width, 4), "f4")
-        depth = frame.depth if frame.depth is not None else np.zeros((height, width), "f4")
-        found = {"color": self._sharp(frame)}
-        for name, array in (("motion", motion), ("depth", depth)):
-            texel = "r32float" if name == "depth" else "rgba32float"
-            images.upload(name, array, texel)
-            found[name] = images.texture(name, frame.size, texel)
+        here = self._exposed.here
+        light = self._light(self._frames, [Cell(here, 1.0, Shutter(0))], lambda _: self._plain)
+        views, (width, height, _) = self._frames.views(here, depth=True), light.size
+        found = {"color": self._copy("color", light)}
+        for name, view, texel, channels in (
+            ("motion", views.motion, "rgba32float", 4),
+            ("depth", views.depth, "r32float", 1),
+        ):
+            if view is None:
+                none = np.zeros((height, width, channels), np.float32)
+                self._images.upload(name, none, texel)
+                found[name] = self._images.texture(name, (width, height), texel)
+            else:
+                found[name] = self._copy(name, view.texture)
         return found
 
-    def _sharp(self, frame: Frame) -> wgpu.GPUTexture:
-        self._images.upload("color", padded(frame.color, 4, 1), "rgba32float")
-        color = self._images.texture("color", frame.size, "rgba32float")
-        if not self._planes.expansion:
-            return color
-        shown = self._images.texture("shown", frame.size, "rgba32float")
-        self._compress(color, shown)
-        return shown
+    def _copy(self, name: str, texture: wgpu.GPUTexture) -> wgpu.GPUTexture:
+        """A copy of a texture that others will use."""
+        size = texture.size[0], texture.size[1]
+        return self._put(texture, self._images.texture(name, size, texture.format))
+
+    def _put(self, texture: wgpu.GPUTexture, target: wgpu.GPUTexture) -> wgpu.GPUTexture:
+        encoder = self._device.create_command_encoder(label="copy")
+        encoder.copy_texture_to_texture({"texture": texture}, {"texture": target}, texture.size)
+        gpu.submit(self._device, encoder)
+        return target
 
     def draw(
         self,
@@ -223,168 +245,22 @@ class VideoSubject:
         timing: Clock | None,
     ) -> int:
         """Draw the exposure of the present output frame with `blur`, all its samples."""
-        shutter, light = blur.shutter, target
-        if self._planes.expansion:
-            size = target.size[0], target.size[1]
-            light = self._images.texture("light", size, "rgba32float")
-        neighbours = "neighbours" in blur.method.uses
-        found = self._exposure(self._state, shutter).cells
-        moving = [cell for cell in found if self._moves_in(cell)]
-        exposed = light
-        if moving:
-            exposed = self._images.texture("exposed", light.size[:2], "rgba32float")
+        shutter = blur.shutter
+        cells = self._exposure(self._state, shutter).cells
         try:
-            parts = ((cell, self._frames(cell.index, neighbours), blur) for cell in found)
-            self._sum.draw(parts, exposed, timing)
+            self._put(self._light(self._frames, cells, lambda _: blur, timing), target)
         finally:
             blur.shutter = shutter
-        if moving:
-            self._change_light(moving, exposed, light)
-        if light is not target:
-            self._compress(light, target)
         return blur.samples
-
-    def _moves_in(self, cell: Cell) -> bool:
-        return cell.shutter.degrees > 0 and "motion" in self._frames(cell.index).has
-
-    def _change_light(
-        self, cells: Sequence[Cell], exposed: wgpu.GPUTexture, output: wgpu.GPUTexture
-    ) -> None:
-        """Add changes of light in the pictures of these cells to the exposure."""
-        for cell in cells:
-            indices, factors = self._frames.surroundings(cell.index)
-            frame, names = self._frames(cell.index), dict(zip(indices, _LIGHTS, strict=True))
-
-            def light(index: int, names: Mapping[int | None, str] = names) -> wgpu.GPUTexture:
-                other, name = self._frames(index), names[index]
-                if self._lit.get(name) is not other.color:
-                    self._images.upload(name, padded(other.color, 4, 1), "rgba32float")
-                    self._lit[name] = other.color
-                return self._images.texture(name, other.size, "rgba32float")
-
-            holdout = frame.holdout
-            assert frame.motion is not None
-            held = None if holdout is None else self._images.upload("held", holdout, "r32float")
-            motion = self._images.upload("moving", frame.motion, "rgba32float")
-            encoder = self._device.create_command_encoder(label="changing light")
-            self._changing.encode(
-                encoder,
-                light,
-                Surroundings(indices, factors, motion, held),
-                shares_of(cell.shutter, factors),
-                cell.share,
-                cell is cells[0],
-            )
-            gpu.submit(self._device, encoder)
-        encoder = self._device.create_command_encoder(label="changing light")
-        self._changing.add(encoder, exposed.create_view(), output.create_view())
-        gpu.submit(self._device, encoder)
-
-    def _compress(self, light: wgpu.GPUTexture, output: wgpu.GPUTexture) -> None:
-        """Make expanded light as it was."""
-        encoder = self._device.create_command_encoder(label="compress")
-        self._planes.compress(encoder, light.create_view(), output.create_view())
-        gpu.submit(self._device, encoder)
 
 
 def _near(number: int, reach: int, known: Knowledge) -> list[int]:
-    """A picture, and with `reach` 1 those that its motion leads to."""
-    found = known(number)
-    if found is None or not reach:
-        return [number]
-    before = None if found.begins else found.before
-    after = None if found.ends else found.after
-    return [n for n in (number, before, after) if n is not None]
-
-
-# ---- frames of a video's pictures, with their motion as far as it is known; the last ones are kept
-
-
-_MEMORY = 1 << 29  # bytes of pictures kept
-_FEWEST = 12  # pictures kept at least
-
-
-class PictureFrames:
-    """Pictures of a video as Frames; `known` tells of their motion.
-
-    `planes`: make their light.
-    """
-
-    def __init__(self, reader: VideoReader, planes: Planes, known: Knowledge):
-        self._reader, self._known = reader, known
-        self._pictures = VideoPictures(reader, planes)
-        self._times = reader.times.seconds
-        self._colors: OrderedDict[int, np.ndarray] = OrderedDict()
-        self._frames: OrderedDict[int, tuple[PictureFinding | None, Frame]] = OrderedDict()
-
-    def __call__(self, number: int, neighbours: bool = False) -> Frame:
-        """A picture with its motion; with `neighbours` between them, where motion leads there."""
-        frame, known = self._frame(number), self._known(number)
-        if not neighbours or known is None or "motion" not in frame.has:
-            return frame
-        before = None if known.begins or known.before is None else self._frame(known.before)
-        after = None if known.ends or known.after is None else self._frame(known.after)
-        return frame.between(
-            *(one if one is not None and "motion" in one.has else None for one in (before, after))
-        )
-
-    def surroundings(
-        self, number: int
-    ) -> tuple[tuple[int | None, int, int | None], tuple[float, float]]:
-        """Numbers of a picture, of those its motion leads to, and of those that `evened` it."""
-        known = self._known(number)
-        if known is None:
-            return (None, number, None), (1.0, 1.0)
-        before = None if known.begins else known.before
-        after = None if known.ends else known.after
-        return (before, number, after), self._factors(number, known)
-
-    def _factors(self, number: int, known: PictureFinding) -> tuple[float, float]:
-        """See evened(); of the motion to the previous and the next picture."""
-        before = None if known.begins_shot else known.before
-        after = None if known.ends_shot else known.after
-        near = [n for n in (before, number, after) if n is not None]
-        known_ways = not known.begins, not known.ends
-        tolerance = self._reader.tolerance
-        return evened(self._times[near], near.index(number), known_ways, tolerance)
-
-    def _frame(self, number: int) -> Frame:
-        known = self._known(number)
-        held = self._frames.get(number)
-        if held is None or held[0] is not known:
-            held = self._frames[number] = known, self._build(number, known)
-            most = max(_MEMORY // (3 * held[1].color.nbytes), _FEWEST)
-            while len(self._frames) > most:
-                self._frames.popitem(last=False)
-        self._frames.move_to_end(number)
-        return held[1]
-
-    def _build(self, number: int, known: PictureFinding | None) -> Frame:
-        color = self._color(number)
-        if known is None or known.motion is None:
-            return Frame(color, number=number).locked()
-        back, ahead = self._factors(number, known)
-        motion = known.motion
-        if (back, ahead) != (1.0, 1.0):
-            motion = motion * np.array([back, back, ahead, ahead], np.float32)
-        held_out = known.holdout
-        made = Frame(color, motion=motion, depth=known.depth, holdout=held_out, number=number)
-        return made.locked()
-
-    def _color(self, number: int) -> np.ndarray:
-        """A picture; the nearest one before, or after, if it cannot be decoded."""
-        if number not in self._colors:
-            color = self._pictures.at(number)
-            near = range(number - 1, -1, -1), range(number + 1, len(self._reader))
-            for other in (n for some in near for n in some):
-                if color is not None:
-                    break
-                color = self._colors.get(other)
-                color = self._pictures.at(other) if color is None else color
-            if color is None:
-                raise InputError(f"{self._reader.path}: its pictures cannot be decoded any more")
-            self._colors[number] = color
-            while len(self._colors) > max(_MEMORY // color.nbytes, _FEWEST):
-                self._colors.popitem(last=False)
-        self._colors.move_to_end(number)
-        return self._colors[number]
+    """A picture, and those that its motion leads to in `reach` steps."""
+    numbers, ends = [number], [number]
+    for _ in range(reach):
+        found = [finding for n in ends if (finding := known(n)) is not None]
+        before = [one.before for one in found if not one.begins]
+        after = [one.after for one in found if not one.ends]
+        ends = [n for n in (*before, *after) if n is not None and n not in numbers]
+        numbers += ends
+    return numbers

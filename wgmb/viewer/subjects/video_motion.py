@@ -16,12 +16,12 @@ import wgpu
 from ...shots.cut_list import CutList
 from ...shots.motion import MotionSource, window
 from ...shots.reader import NoPicturesError, Picture, ShotReader
+from ...video.exposures import BEFORE
 from ...video.holdouts import NONE, Held, holdout_of
 from ...video.motion import VideoMotion
 from ...video.read.reader import VideoReader
 from ...video.thumbnail import Thumbnail, change, is_cut
 
-_BEFORE = 10  # pictures before one that may have a say in its motion, or in where its shot begins
 _EARLIER = 8  # more of them read at first, so that going back does not begin anew at each step
 _BEHIND = 24  # pictures kept behind one
 _NEAR = 48  # pictures ahead that are read on to
@@ -46,6 +46,14 @@ class PictureFinding:
     """It repeats the picture before, or cannot be decoded: those beside it reach over its time."""
     holdout: np.ndarray | None = None
     """(height, width): 1 stays sharp; of pictures with motion."""
+    time: float | None = None
+    """The time that a cadence gives it, on the video's clock [s]; None: that in the file."""
+
+    @property
+    def bytes(self) -> int:
+        """Memory that its arrays take."""
+        arrays = self.motion, self.depth, self.holdout
+        return sum(array.nbytes for array in arrays if array is not None)
 
 
 @dataclass(frozen=True)
@@ -86,17 +94,18 @@ class PictureFinder:
         """The finding about a picture, as far as possible."""
         shots = self._shots_around(number)
         try:
-            here = shots.at(self._times[number], _BEHIND)
+            shots.at(self._times[number], _BEHIND)
         except NoPicturesError:  # from some pictures before it on, none can be decoded
             return PictureFinding(None, None, None, None, is_left_out=True)
-        near = {i: shots[i].number for i in (here - 1, here, here + 1) if i in shots.kept}
-        if near.get(here) != number:
-            beside = sorted(near.values())
-            before = max((n for n in beside if n < number), default=None)
-            after = min((n for n in beside if n > number), default=None)
+        near = {i: shots[i].number for i in shots.kept}
+        here = next((i for i, n in near.items() if n == number), None)
+        if here is None:
+            before = max((n for n in near.values() if n < number), default=None)
+            after = min((n for n in near.values() if n > number), default=None)
             return PictureFinding(None, None, before, after, is_left_out=True)
         found = self._motion(here) if self._motion else None
         motion, depth = found or (None, None)
+        time = shots[here].time
         return PictureFinding(
             motion,
             depth,
@@ -107,6 +116,7 @@ class PictureFinder:
             begins_shot=not shots.same_shot(here, here - 1),
             ends_shot=not shots.same_shot(here, here + 1),
             holdout=None if found is None or not self._held else self._held(here),
+            time=None if time == self._times[number] else time,
         )
 
     def close(self) -> None:
@@ -123,10 +133,10 @@ class PictureFinder:
             first, last = shots[kept[0]].number, shots[kept[-1]].number
             at_start = first == 0 or (kept[0] == 0 and first > number)
             behind = sum(shots[i].number < number for i in kept)
-            if number <= last + _NEAR and (at_start or behind >= _BEFORE):
+            if number <= last + _NEAR and (at_start or behind >= BEFORE):
                 return shots
         self.close()
-        first = max(number - _BEFORE - _EARLIER, 0)
+        first = max(number - BEFORE - _EARLIER, 0)
         self._shots = shots = ShotReader(
             self._pictures(first),
             is_cut=self._is_cut if self._cuts.is_search else None,
