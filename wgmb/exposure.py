@@ -49,7 +49,7 @@ def cells(times: Sequence[float], at: float, interval: float, shutter: Shutter) 
     first, last = here[0] - own_interval(here, 0) / 2, here[-1] + own_interval(here, -1) / 2
     borders = np.concatenate([[first], ends, [last]])
     opens, closes = (at + interval * t for t in shutter.span)
-    found = []
+    parts = []
     reached = np.searchsorted(borders, (opens, closes), side="right") - 1
     for index in range(max(int(reached[0]), 0), min(int(reached[1]), len(here) - 1) + 1):
         begin, end = max(opens, borders[index]), min(closes, borders[index + 1])
@@ -58,12 +58,12 @@ def cells(times: Sequence[float], at: float, interval: float, shutter: Shutter) 
         if share >= _LEAST:
             own = own_interval(here, index)
             part = shutter.part(*inner).timed(interval / own, (at - here[index]) / own)
-            found.append(Cell(index, share, part))
-    if not found:
+            parts.append(Cell(index, share, part))
+    if not parts:
         nearest = int(np.abs(here - np.clip(at, opens, closes)).argmin())
         return [Cell(nearest, 1.0, Shutter(0))]
-    total = sum(cell.share for cell in found)
-    return [Cell(cell.index, cell.share / total, cell.shutter) for cell in found]
+    total = sum(cell.share for cell in parts)
+    return [Cell(cell.index, cell.share / total, cell.shutter) for cell in parts]
 
 
 def cells_in_shot(
@@ -92,8 +92,8 @@ def cells_in_shot(
             break
         numbers.append(after)
         times.append(time(after))
-    found = cells(times, at, interval, shutter)
-    return [replace(cell, index=numbers[cell.index]) for cell in found]
+    parts = cells(times, at, interval, shutter)
+    return [replace(cell, index=numbers[cell.index]) for cell in parts]
 
 
 def own_interval(times: np.ndarray, index: int) -> float:

@@ -57,13 +57,13 @@ class Console:
         for number, why in sorted(report.failed.items()):
             complain(f"frame {number} failed: {why}")
         if report.stopped:
-            rest = counted(report.rest, "other frame")
-            complain(f"stopped: {report.stopped}; {rest} not written")
+            unwritten = counted(report.rest, "other frame")
+            complain(f"stopped: {report.stopped}; {unwritten} not written")
         for mask in report.absent:
             complain(f"{mask} is in no frame, so it changed nothing")
         for number, bad in sorted(report.bad.items()):
-            what = ", ".join(f"{n} in {name}" for name, n in bad.items())
-            self.say(f"frame {number}: ignored pixels that are not finite: {what}")
+            pixels = ", ".join(f"{n} in {name}" for name, n in bad.items())
+            self.say(f"frame {number}: ignored pixels that are not finite: {pixels}")
         if self.verbose or report.is_finding_notable:
             self.say(f"vectors: {report.finding}")
         self._tell_frames(report)

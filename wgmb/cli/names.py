@@ -61,7 +61,7 @@ def is_batch(patterns: Sequence[str], output: str) -> bool:
 
 def videos_of(patterns: Sequence[str]) -> list[Path]:
     """The videos that files, folders and patterns such as clips/*.mp4 stand for, in order."""
-    found: list[Path] = []
+    paths: list[Path] = []
     for pattern in patterns:
         path = Path(pattern)
         if path.is_dir():
@@ -74,15 +74,15 @@ def videos_of(patterns: Sequence[str]) -> list[Path]:
                     f"{pattern}: a folder without videos ({known}); frames need a pattern such as "
                     f"{path / 'shot.####.exr'}"
                 )
-            found += inside
+            paths += inside
         elif _has_wildcard(pattern):
             matches = sorted(map(Path, glob.glob(pattern)))
             if not matches:
                 raise InputError(f"{pattern}: no such files")
-            found += matches
+            paths += matches
         else:
-            found.append(path)
-    for path in found:
+            paths.append(path)
+    for path in paths:
         is_frames = is_pattern(path) and not path.is_file()
         if is_frames or path.suffix.lower() in (".exr", *stills.SUFFIXES):
             such = next((p.replace("*", "####") for p in patterns if _is_of_frames(p)), "")
@@ -90,7 +90,7 @@ def videos_of(patterns: Sequence[str]) -> list[Path]:
                 f"{path}: several inputs must be videos; frames need one pattern such as "
                 f"'{such or 'shot.####.exr'}', in quotes"
             )
-    return found
+    return paths
 
 
 def outputs_of(videos: Sequence[Path], output: str) -> list[str]:

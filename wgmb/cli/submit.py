@@ -30,14 +30,14 @@ def openjd(template: Path, job_file: Path, numbers: Sequence[int], chunk: int) -
             f"{template} must lie in the folder of {job_file}, or above it, because "
             "OpenJD looks for files from there"
         ) from None
-    found = ranges(sorted(numbers))
-    frames = openjd_ranges(found)
+    spans = ranges(sorted(numbers))
+    frames = openjd_ranges(spans)
     if len(frames) > _MOST_IN_PARAMETER:
         raise InputError(
             f"frames {frames[:60]}... take {len(frames)} characters, an OpenJD template takes "
             f"{_MOST_IN_PARAMETER}; write jobs of fewer `frames` each"
         )
-    gapless = len(found) == 1 and abs(found[0][2]) == 1
+    gapless = len(spans) == 1 and abs(spans[0][2]) == 1
     kind = "CONTIGUOUS" if gapless else "NONCONTIGUOUS"
     name = "".join(c if c.isprintable() and c not in "{}" else "_" for c in job_file.stem)
     return f"""{MARK}. Names of files are in the job file.

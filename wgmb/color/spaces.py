@@ -113,10 +113,10 @@ class ColorConfig:
         """
         for key in _NAMED_BY:
             value = attributes.get(key)
-            found = self._config.getColorSpace(value) if isinstance(value, str) and value else None
-            names = [found.getName(), *found.getAliases()] if found else []
-            if found and str(value).casefold() in map(str.casefold, names):
-                return ColorSpace(self, found.getName(), key)
+            space = self._config.getColorSpace(value) if isinstance(value, str) and value else None
+            names = [space.getName(), *space.getAliases()] if space else []
+            if space and str(value).casefold() in map(str.casefold, names):
+                return ColorSpace(self, space.getName(), key)
         if attributes.get("acesImageContainerFlag") == 1:
             return self._by_primaries(AP0, "acesImageContainerFlag")
         if (given := attributes.get("chromaticities")) is not None:
@@ -256,9 +256,9 @@ class ColorConfig:
     def _by_primaries(self, primaries: tuple[float, ...], why: str) -> ColorSpace:
         for name, known in _NAMED.items():
             if np.allclose(primaries, known, rtol=0, atol=1e-5) and (
-                found := self._config.getColorSpace(name)
+                space := self._config.getColorSpace(name)
             ):
-                return ColorSpace(self, found.getName(), why)
+                return ColorSpace(self, space.getName(), why)
         if self._interchange is None:
             raise InputError(
                 f"{self.name} has neither the role aces_interchange nor a space of known primaries "

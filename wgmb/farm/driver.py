@@ -351,12 +351,12 @@ class Driver:
             worker.why_not = report.stopped
             self._refuse(worker, False)
             kept = set(done)
-            rest = [n for n in part.numbers if n not in kept]
+            unfinished = [n for n in part.numbers if n not in kept]
             report.failed = {}
             if part.refused_by:
-                report.failed = dict.fromkeys(rest, report.stopped)
+                report.failed = dict.fromkeys(unfinished, report.stopped)
             else:
-                self._parts.append(Chunk(rest, refused_by={worker.address}))
+                self._parts.append(Chunk(unfinished, refused_by={worker.address}))
         merge.share(report, part.numbers)
         merge.add(self.report, report)
         for number in (*done, *report.failed):

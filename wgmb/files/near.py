@@ -33,8 +33,8 @@ def near(path: Path) -> str:
             ranks = {e.name: _rank(wanted, _parts(e.name), e.stat().st_size) for e in files}
     except OSError:
         return ""
-    found = {name: rank for name, rank in ranks.items() if rank is not None}
-    return max(sorted(found), key=found.__getitem__, default="")
+    by_rank = {name: rank for name, rank in ranks.items() if rank is not None}
+    return max(sorted(by_rank), key=by_rank.__getitem__, default="")
 
 
 def _parts(name: str) -> _Parts:

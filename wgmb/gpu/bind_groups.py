@@ -38,9 +38,9 @@ class BindGroups:
     ) -> wgpu.GPUBindGroup:
         """The group of `layout` that binds these resources by their indices."""
         key = layout.uid, *map(_identity, resources.values())
-        found = self._groups.get(key)
-        if found is not None:
-            return found[0]
+        entry = self._groups.get(key)
+        if entry is not None:
+            return entry[0]
         made = made_group(device, layout, resources)
         things = {thing.uid: thing for thing in map(_thing, resources.values())}
         self._groups[key] = made, set(things)

@@ -32,13 +32,13 @@ def adapters() -> list[wgpu.GPUAdapter]:
     if _draws_with_opengl():
         with suppress(RuntimeError):  # wgpu has been used already, and it is too late
             set_instance_extras(backends=["Vulkan", "Metal", "DX12"])
-    found = wgpu.gpu.enumerate_adapters_sync()
+    listed = wgpu.gpu.enumerate_adapters_sync()
 
     def rank(adapter: wgpu.GPUAdapter) -> tuple[bool, int]:
         kind = adapter.info["adapter_type"]
         return _is_opengl(adapter), _PREFERENCE.index(kind) if kind in _PREFERENCE else 3
 
-    return sorted(found, key=rank)
+    return sorted(listed, key=rank)
 
 
 def _draws_with_opengl() -> bool:
@@ -62,13 +62,13 @@ def choose_adapter(name: str | None = None) -> wgpu.GPUAdapter:
     refused unless `name` asks for it ("opengl" is enough): it lacks features and precision.
     """
     name = name or os.environ.get("WGMB_ADAPTER") or ""
-    found = adapters()
-    listing = "; ".join(f"{i}: {a.summary}" for i, a in enumerate(found)) or "none at all"
+    listed = adapters()
+    listing = "; ".join(f"{i}: {a.summary}" for i, a in enumerate(listed)) or "none at all"
     if name.isdigit():
-        if int(name) >= len(found):
+        if int(name) >= len(listed):
             raise DeviceError(f"no adapter number {name}; found {listing}")
-        return found[int(name)]
-    matching = [a for a in found if name.lower() in a.summary.lower()]
+        return listed[int(name)]
+    matching = [a for a in listed if name.lower() in a.summary.lower()]
     if not matching:
         hint = "" if name else "; install a Vulkan driver (Debian, Ubuntu: mesa-vulkan-drivers)"
         raise DeviceError(

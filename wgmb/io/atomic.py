@@ -46,12 +46,12 @@ def mode_of(folder: Path, inputs: Iterable[Path]) -> int:
     group, readers = _group_in(folder), 0o044
     for path in inputs:
         try:
-            found = os.stat(path)
+            status = os.stat(path)
         except OSError:  # it is not there yet, or is no file
             continue
-        if stat.S_ISREG(found.st_mode):
-            all_others = found.st_mode >> 3 & found.st_mode & 0o004
-            readers &= found.st_mode if found.st_gid == group else all_others << 3 | all_others
+        if stat.S_ISREG(status.st_mode):
+            all_others = status.st_mode >> 3 & status.st_mode & 0o004
+            readers &= status.st_mode if status.st_gid == group else all_others << 3 | all_others
     return 0o600 | readers | readers >> 1
 
 

@@ -27,8 +27,8 @@ def weights(chromaticities: object = None) -> np.ndarray:
         xy = np.array(given, np.float64).reshape(4, 2)
         columns = np.column_stack([xy, 1 - xy.sum(axis=1)]).T
         white = columns[:, 3] / xy[3, 1]
-        found = np.linalg.solve(columns[:, :3], white) * xy[:3, 1]
-        shares = found / found.sum()
+        luminances = np.linalg.solve(columns[:, :3], white) * xy[:3, 1]
+        shares = luminances / luminances.sum()
     except (ValueError, TypeError, ArithmeticError, np.linalg.LinAlgError):
         shares = np.full(3, np.nan)
     if not (np.isfinite(shares).all() and shares[1] != 0):

@@ -129,12 +129,12 @@ def read(
     if header_only:
         return Exr(path, promised)
     needed = sum(limits.unpacked(part.size, len(part.channels)) for part in promised)
-    what = "{} x {}, ".format(*promised[0].size) + f"{count} channels,"
+    description = "{} x {}, ".format(*promised[0].size) + f"{count} channels,"
     if any(is_deep):
         needed += deep.needed(path, header.parts)
-        what += " deep,"
+        description += " deep,"
     stored = path.stat().st_size
-    limits.check(path, what, needed, stored, max_mb)
+    limits.check(path, description, needed, stored, max_mb)
     if held is not None:
         each = held(list(Exr(path, promised).channels()))
         limits.check_held(path, promised[0].size, each, stored, max_mb)

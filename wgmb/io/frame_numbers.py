@@ -154,10 +154,10 @@ def numbers_on_disk(pattern: str | Path) -> list[int]:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{parsed.folder}: {(why or str(error)).lower()}") from None
-    found = sorted({int(m[1]) for m in matches if m[0] in parsed.names(int(m[1]))})
-    if not found:
+    numbers = sorted({int(m[1]) for m in matches if m[0] in parsed.names(int(m[1]))})
+    if not numbers:
         raise InputError(f"{pattern}: no such frames{_near(pattern)}")
-    return found
+    return numbers
 
 
 def patterns_in(folder: str | Path) -> list[str]:

@@ -135,9 +135,9 @@ def _digits(file: BinaryIO, begin: int, end: int) -> bytes:
     changed = [(digits, _BLANK)]
     if _piece(file, 0, 8) == _PNG:  # the record is in a chunk, whose CRC changes with the digits
         lead = _piece(file, max(0, begin - _AFTER_KEYWORD), digits)
-        rest = _piece(file, after, end)
-        changed.append((end, _crc32(lead, _BLANK, rest)))
-        if _piece(file, end, end + 4) != _crc32(lead, _piece(file, digits, after), rest):
+        tail = _piece(file, after, end)
+        changed.append((end, _crc32(lead, _BLANK, tail)))
+        if _piece(file, end, end + 4) != _crc32(lead, _piece(file, digits, after), tail):
             return b""
     crc, at, size = 0, 0, file.seek(0, os.SEEK_END)
     for place, instead in [*changed, (size, b"")]:

@@ -115,8 +115,8 @@ def jpeg(data: bytes) -> bytes:
     view, at, kept, scans, segments = memoryview(data), 0, [], 0, 0
     if data[:2] != b"\xff\xd8":
         raise ValueError("no JPEG header")
-    while found := _MARKER.search(data, at):
-        marker, begin, at = found[1][0], found.start(), found.end()
+    while match := _MARKER.search(data, at):
+        marker, begin, at = match[1][0], match.start(), match.end()
         if (segments := segments + 1) > _MOST_PARTS:
             raise ValueError(f"has over {_MOST_PARTS:,} segments")
         if marker not in _ALONE:
@@ -177,8 +177,8 @@ def tiff(data: bytes) -> bytes:
         kept[tag] = data[each : each + entry]
     new = struct.pack(count_form, len(kept)) + b"".join(kept[tag] for tag in sorted(kept))
     head = data[:place] + struct.pack(order + ("Q" if big else "I"), padded := len(data) + 16)
-    rest = memoryview(data)[len(head) :]
-    return b"".join([head, rest, bytes(padded - len(data)), new, bytes(8)])
+    body = memoryview(data)[len(head) :]
+    return b"".join([head, body, bytes(padded - len(data)), new, bytes(8)])
 
 
 def tiff_segment(page: Any) -> int:

@@ -109,13 +109,13 @@ class Laboratory:
         budget: float | None = None,
     ) -> list[Entry]:
         """Every candidate's picture with its number of samples, judged, and timed in turns."""
-        found, timed = [], []
+        entries, timed = [], []
         for c, samples in jobs.items():
             self.tell(f"{case.name}: {c.label}, {samples} samples")
             blur = c.blur(samples, case.shutter, self.device)
             picture = self.picture(case, blur, c)
             judged = measure(picture, case.truth)
-            found.append(
+            entries.append(
                 Entry(case.name, c.label, kind, judged, samples, budget=budget, on_page=on_page,
                       traced=c.needs_scene, picture=picture if on_page else None)
             )  # fmt: skip
@@ -124,7 +124,7 @@ class Laboratory:
         frames = [0.0 if c.needs_scene else frame_seconds for c in jobs]
         return [
             replace(entry, seconds=s + f, frame_seconds=f)
-            for entry, s, f in zip(found, seconds, frames, strict=True)
+            for entry, s, f in zip(entries, seconds, frames, strict=True)
         ]
 
     def _fitting(

@@ -82,11 +82,11 @@ def _check_options(with_name: str, options: Any) -> None:
     if not is_dataclass(options) or not options.__dataclass_params__.frozen:  # pyright: ignore
         raise InputError(f"{with_name}: Options is not a frozen dataclass")
     try:
-        found = options_of(options)
+        declared = options_of(options)
         options()  # its defaults are values that it takes
     except Exception as error:  # an annotation is any expression
         raise InputError(f"{with_name}: Options: {error}") from None
-    for name, option in found.items():
+    for name, option in declared.items():
         if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or name in RESERVED:
             raise InputError(f"{with_name}: no option can have the name {name}")
         if option.kind not in (str, bool, int, float):

@@ -64,8 +64,8 @@ class Option:
         except (TypeError, ValueError):
             right = False
         if not right or (self.range is not None and value not in self.range):  # pyright: ignore
-            what = "a whole number" if self.kind is int else "a number"
-            raise InputError(f"{self.name} must be {self.range or what}, got {value!r}")
+            expected = "a whole number" if self.kind is int else "a number"
+            raise InputError(f"{self.name} must be {self.range or expected}, got {value!r}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -269,7 +269,7 @@ def _meets(
 
     They are `wide` at their origin and spread by the tangent `spread`.
     """
-    found = False
+    hits = False
     for bound, slab in zip(bounds, slabs, strict=True):
         if not bound[3]:
             continue
@@ -283,8 +283,8 @@ def _meets(
         edges = [(height + k * (slab[3] + thick)) / rise for k in (-1, 1)]
         first = np.maximum(along - half, np.minimum(*edges))
         last = np.minimum(along + half, np.maximum(*edges))
-        found = found | ((root > 0) & (first <= last) & (last > 0))
-    return np.broadcast_to(found, np.broadcast_shapes(np.shape(origin), np.shape(direction))[:-1])
+        hits = hits | ((root > 0) & (first <= last) & (last > 0))
+    return np.broadcast_to(hits, np.broadcast_shapes(np.shape(origin), np.shape(direction))[:-1])
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -92,8 +92,8 @@ class BatchReport:
         if more := failed[MOST_ROWS:]:
             rows.append(("failed too", frame_list([number for number, _ in more])))
         for number, counts in sorted(self.bad.items())[:MOST_ROWS]:
-            what = ", ".join(f"{count} of {name}" for name, count in counts.items())
-            rows.append((f"frame {number}: pixels that are not finite", what))
+            pixels = ", ".join(f"{count} of {name}" for name, count in counts.items())
+            rows.append((f"frame {number}: pixels that are not finite", pixels))
         rows += [("stopped", self.stopped)] + [("in no frame", name) for name in self.absent]
         told = [(head, text) for head, text in rows if text]
         return "<table>{}</table>".format(

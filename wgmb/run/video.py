@@ -144,19 +144,19 @@ class VideoRun:
         flow, method = self.request.video.chosen(self.blur.device)[0], self.blur.method.name
         qualities = {"best": "`flow_quality=fast`", "fast": "`flow_quality=draft`"}
         if flow.flow == "search" and flow.flow_quality in qualities:
-            found = f"{qualities[flow.flow_quality]} takes less"
+            advice = f"{qualities[flow.flow_quality]} takes less"
         elif (flow.flow == "search" and is_installed("cv2")) or (
             flow.flow == "dis" and self.at_edges is not None
         ):
-            found = "`flow=dis` takes less, but loses fast motion"
+            advice = "`flow=dis` takes less, but loses fast motion"
         elif flow.flow == "dis" and (flow.flow_quality, method) != ("fast", "tap"):
             by = "`flow_quality=fast`" if flow.flow_quality == "best" else "`method=tap`"
-            found = f"{by} takes less"
+            advice = f"{by} takes less"
         elif self.motion is not None:
-            found = "`flow=none`, which averages pictures, takes less"
+            advice = "`flow=none`, which averages pictures, takes less"
         else:
             return "`end` ends earlier"
-        return found
+        return advice
 
     def plan(self, path: str | Path, output: OutputSettings) -> VideoPlan:
         """Open a video; InputError if it cannot be read or has no pictures in the range."""

@@ -106,18 +106,18 @@ def canvas(needed: Window, limit: Window, windows: Iterable[Window], display: Wi
         step, origin = _GRID[i % 2], display[i % 2]
         cells = (needed[i] - origin) // step if i < 2 else -(-(needed[i] + 1 - origin) // step)
         snapped.append(origin + cells * step - (i >= 2))
-    found = common((snapped[0], snapped[1], snapped[2], snapped[3]), limit)
-    if found is None or _area(found) >= _LARGE * _area(limit):
-        found = limit
-    width, height = size_of(found)
-    if max(width, height) > MOST_PIXELS_A_SIDE or _area(found) > _MOST_AREA * max(
+    window = common((snapped[0], snapped[1], snapped[2], snapped[3]), limit)
+    if window is None or _area(window) >= _LARGE * _area(limit):
+        window = limit
+    width, height = size_of(window)
+    if max(width, height) > MOST_PIXELS_A_SIDE or _area(window) > _MOST_AREA * max(
         map(_area, (display, *windows))
     ):
         raise InputError(
             f"its data window and its neighbours' need a canvas of {width} x {height}; at most "
             f"{MOST_PIXELS_A_SIDE} per side and {_MOST_AREA} times the display window"
         )
-    return found
+    return window
 
 
 def near_enough(one: Window, other: Window) -> bool:
@@ -167,8 +167,8 @@ def laid(
     columns = slice(shared[0] - window[0], shared[2] - window[0] + 1)
     spread = [n if edge else 0 for n, edge in zip((left, top, right, bottom), edges, strict=True)]
     filled = np.pad(array[rows, columns], _sides(spread, array.ndim), mode="edge")
-    rest = [n - done for n, done in zip((left, top, right, bottom), spread, strict=True)]
-    return np.pad(filled, _sides(rest, array.ndim), constant_values=empty)
+    margins = [n - done for n, done in zip((left, top, right, bottom), spread, strict=True)]
+    return np.pad(filled, _sides(margins, array.ndim), constant_values=empty)
 
 
 def _sides(by: list[int], dimensions: int) -> list[tuple[int, int]]:

@@ -58,7 +58,7 @@ Range = tuple[int, int, int]
 
 def ranges(numbers: Sequence[int]) -> list[Range]:
     """Numbers, in their order, as few ranges; two that stand alone are not made one."""
-    found: list[Range] = []
+    spans: list[Range] = []
     at = 0
     while at < len(numbers):
         end, step = at, 0
@@ -69,9 +69,9 @@ def ranges(numbers: Sequence[int]) -> list[Range]:
             end, step = end + 1, apart
         if end == at + 1 and abs(step) != 1:  # the second one may begin a longer range
             end = at
-        found.append((numbers[at], numbers[end], step if end > at else 1))
+        spans.append((numbers[at], numbers[end], step if end > at else 1))
         at = end + 1
-    return found
+    return spans
 
 
 def numbers(ranges: Iterable[Sequence[int]]) -> list[int]:

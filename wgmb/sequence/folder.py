@@ -124,13 +124,15 @@ def frames_in(folder: str | Path, also: tuple[str, ...] = (), leave_out: str = "
     there = [s for s in _sequences(base) if not leave_out or s.pattern != Path(leave_out)]
     picture = _picture(base, there)
     others = [s for s in there if s is not picture]
-    rest = [s for s in others if s.goes_with(picture)]
+    companions = [s for s in others if s.goes_with(picture)]
     beside: dict[str, list[_Sequence]] = {"vectors": [], "depth": []}
     if not also and not picture.has_vectors:
-        found = (_one(base, rest, "vectors", lambda s, d=d: s.direction == d) for d in (1, -1))
-        beside["vectors"] = [s for s in found if s is not None]
+        vectors = (
+            _one(base, companions, "vectors", lambda s, d=d: s.direction == d) for d in (1, -1)
+        )
+        beside["vectors"] = [s for s in vectors if s is not None]
     if not also and names.find_depth(picture.channels) is None:
-        depth = _one(base, rest, "depth", lambda s: s.is_depth)
+        depth = _one(base, companions, "depth", lambda s: s.is_depth)
         beside["depth"] = [depth] if depth is not None else []
     own = [f"picture {picture}"]
     own += [f"{kind} {' and '.join(map(str, some))}" for kind, some in beside.items() if some]
@@ -140,7 +142,7 @@ def frames_in(folder: str | Path, also: tuple[str, ...] = (), leave_out: str = "
             "vectors": not picture.has_vectors and not beside["vectors"],
             "depth": names.find_depth(picture.channels) is None and not beside["depth"],
         }
-        text += _left_out(picture, [s for s in others if s not in rest], needed)
+        text += _left_out(picture, [s for s in others if s not in companions], needed)
     patterns = tuple(str(s.pattern) for some in beside.values() for s in some)
     return FolderFrames(str(picture.pattern), also or patterns, text)
 

@@ -62,7 +62,7 @@ class FrameCache:
                 self._kept.popitem(last=False)
             passes, paths = self.passes, self.files.paths(number)
             names, titles = self.files.view_names, self.files.titles
-            found = read(
+            sources = read(
                 paths,
                 number,
                 passes.color,
@@ -74,15 +74,15 @@ class FrameCache:
                 is_blurred=True,
             )
             if self._space is not None:
-                found = tuple(in_space(source, self._space) for source in found)
+                sources = tuple(in_space(source, self._space) for source in sources)
             if self.views:  # the first frame says which is the default
-                found = tuple(sorted(found, key=lambda source: source.view != self.views[0]))
-            self._kept[number] = found
-            self.sizes[number] = found[0].whole
-            if lacking := sorted(set(self.views) - {source.view for source in found}):
+                sources = tuple(sorted(sources, key=lambda source: source.view != self.views[0]))
+            self._kept[number] = sources
+            self.sizes[number] = sources[0].whole
+            if lacking := sorted(set(self.views) - {source.view for source in sources}):
                 text = f"lacks the view {', '.join(lacking)}, which others have"
                 self.notes.setdefault(text, []).append(number)
-            for note in dict.fromkeys(note for source in found for note in source.notes):
+            for note in dict.fromkeys(note for source in sources for note in source.notes):
                 self.notes.setdefault(note, []).append(number)
         return self._kept[number]
 

@@ -225,7 +225,7 @@ def read(
     first = files.content(in_view(paths[0], named[0] if named else None), space)
     full = tuple(view for view in first.named if first.views[view])
     there = tuple(named) or full or (None,)
-    found = []
+    sources = []
     for view in there:
         contents = [
             (
@@ -235,9 +235,9 @@ def read(
             for i, (path, title) in enumerate(zip(paths, titles, strict=True))
         ]
         chosen = [(c, c.chosen(view, there[0], whole)) for c, whole in contents]
-        found.append(_together(chosen, number, wanted, view))
+        sources.append(_together(chosen, number, wanted, view))
     empty = () if named else tuple(v for v in first.named if not first.views[v])
-    return _noted(tuple(found), empty)
+    return _noted(tuple(sources), empty)
 
 
 @dataclass

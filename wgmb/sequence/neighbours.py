@@ -155,10 +155,10 @@ class Neighbours:
         frames = {0: (source, self._locked(source, wanted))}
         for side in (-1, 1):
             for offset in range(side, side * (reach + 1), side):
-                found = self._neighbour(*frames[offset - side], side, wanted)
-                if found is None:
+                neighbour = self._neighbour(*frames[offset - side], side, wanted)
+                if neighbour is None:
                     break
-                frames[offset] = found
+                frames[offset] = neighbour
         onto = self._canvas(frames, extent)
         made = {side: self._on(onto, *one) for side, one in frames.items()}
         beside: list[Frame | None] = []
@@ -177,8 +177,8 @@ class Neighbours:
         frame, canvas = self._locked(source, wanted), onto or source.data_window
 
         def load(side: int) -> Frame | None:
-            found = self._neighbour(source, frame, side, wanted)
-            return self.opened(found[0], wanted, canvas) if found else None
+            neighbour = self._neighbour(source, frame, side, wanted)
+            return self.opened(neighbour[0], wanted, canvas) if neighbour else None
 
         placed = self._on(canvas, source, frame)
         if onto is None and placed.motion is not None and may_be_held(placed.motion):

@@ -192,8 +192,8 @@ def compare(
     for make in cases:
         case = make()
         lab.compare(report, case, able, steps, budgets)
-        if found := crossings(report, case):
-            report.tables.append(found)
+        if crossing_table := crossings(report, case):
+            report.tables.append(crossing_table)
     report.title = "Motion blur compared: " + ", ".join(c.name for c in report.cases)
     files = (file for name in inputs or () for file in input.open(name).dependencies.every())
     write(report, output, [*(truth or ()), *baselines.values(), *files])

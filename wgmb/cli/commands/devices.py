@@ -13,12 +13,12 @@ def devices() -> int:
 
     Example: WGMB_ADAPTER=llvmpipe wgmb devices
     """
-    found = gpu.adapters()
+    adapters = gpu.adapters()
     try:
         chosen = gpu.choose_adapter()
     except DeviceError:
         chosen = None
-    for i, adapter in enumerate(found):
+    for i, adapter in enumerate(adapters):
         same = chosen is not None and adapter.summary == chosen.summary
         out(f"{'*' if same else ' '} {i}: {adapter.summary}")
     if chosen is None:

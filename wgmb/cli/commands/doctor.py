@@ -152,14 +152,14 @@ def _adapters() -> Iterator[str]:
     try:
         from ... import gpu
 
-        found = gpu.adapters()
+        adapters = gpu.adapters()
     except Exception:  # whatever is wrong with a driver or a library is for the report
         return
     try:
         chosen = gpu.choose_adapter().summary
     except DeviceError:
         chosen = None
-    for i, adapter in enumerate(found):
+    for i, adapter in enumerate(adapters):
         mark = "*" if adapter.summary == chosen else " "
         yield f"{mark} adapter {i}: {adapter.summary}; driver {adapter.info['description']}"
 

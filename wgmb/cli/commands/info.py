@@ -76,14 +76,14 @@ def info(
     if scan:
         raise InputError("`scan` is for videos")
     shown = color.open()
-    found = frames_at(pattern, input)
-    clip = found.input.open(found.pattern, space=color.space(shown))
+    source = frames_at(pattern, input)
+    clip = source.input.open(source.pattern, space=color.space(shown))
     Console().say(color.remark)
     if output is not None and output.exists() and not overwrite:
         raise InputError(f"{output} exists; --overwrite replaces it")
     lines = describe(clip, output, shown)
     lines[1:1] = [("program", as_options(input.remark))] if input.remark else []
-    lines[:0] = [("folder", found.text)] if found.text else []
+    lines[:0] = [("folder", source.text)] if source.text else []
     for name, text in lines:
         out(f"{name:10}{text}")
     return DONE
@@ -164,8 +164,8 @@ def _about_motion(clip: Clip, source: FrameFile, output: Path | None) -> list[tu
         colors = bad_colors([source.channels[name] for name in source.color if name])
         bad = {"color": colors, **bad} if colors else bad
     if bad:
-        found = [f"{counted(n, 'pixel')} of {name}" for name, n in bad.items()]
-        lines.append(("bad", f"not finite or not in front of the camera: {', '.join(found)}"))
+        counts = [f"{counted(n, 'pixel')} of {name}" for name, n in bad.items()]
+        lines.append(("bad", f"not finite or not in front of the camera: {', '.join(counts)}"))
     if "motion" not in frame.has:
         if output:
             raise InputError(f"{source.path}: no motion to draw (neither vectors nor a camera)")

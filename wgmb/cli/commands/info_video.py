@@ -43,8 +43,8 @@ def tell_about(path: str, max_mb: float, scan: bool) -> int:
         return DONE
     console = Console()
     with console.progress(len(reader), "reading") as tick:
-        found = scan_video(reader, tick)
-    _print(found)
+        summary = scan_video(reader, tick)
+    _print(summary)
     if scaling := reader.scaling():
         _print([("scaled", scaling)])
     if loss := reader.loss():

@@ -99,13 +99,13 @@ def job(
     _check_target("--job", file, (".json",), is_job)
     _check_target("--openjd", openjd, (".yaml", ".yml"), is_ours)
     _check_target("--slurm", slurm, (".sh",), is_ours)
-    found = frames_at(pattern, input, output.output)
+    source = frames_at(pattern, input, output.output)
     request = BlurRequest(
-        pattern=found.pattern,
+        pattern=source.pattern,
         output=output,
         blur=blur,
         shutter=shutter,
-        input=found.input,
+        input=source.input,
         color=color,
         video=video,
         confidence=confidence,
@@ -128,7 +128,7 @@ def job(
         mode = mode_of(path.parent, made.clip.dependencies.every())
         write_file(path, text.encode(), mode=mode)
     console, finding = Console(quiet), made.findings.finding
-    console.say(found.text, *made.remarks, f"vectors: {finding.text}" if finding.notable else "")
+    console.say(source.text, *made.remarks, f"vectors: {finding.text}" if finding.notable else "")
     frames = f"{counted(len(made.numbers), 'frame')} ({frame_list(made.numbers)})"
     console.say(f"{file}: {frames} with {made.request.blur.method}, not blurred yet")
     return DONE

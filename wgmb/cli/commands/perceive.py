@@ -136,12 +136,12 @@ def _report(
         raise InputError(f"{path} exists; --overwrite replaces it")
     best = best_shutter(speed, fps, perception.cone) if speed is not None else None
     speeds = np.linspace(fps / 12, fps * 5 / 3, 20)
-    found = compare(fps, speeds, perception.cone)
-    write_file(path, charts.svg(*perception_charts(found, speeds, fps)).encode())
+    sharpness = compare(fps, speeds, perception.cone)
+    write_file(path, charts.svg(*perception_charts(sharpness, speeds, fps)).encode())
     if not console.quiet:
-        out("rad/s    " + "".join(f"{name:>11}" for name in found))
+        out("rad/s    " + "".join(f"{name:>11}" for name in sharpness))
         for i in range(3, len(speeds), 4):
-            row = "".join(f"{values[i]:11.4f}" for values in found.values())
+            row = "".join(f"{values[i]:11.4f}" for values in sharpness.values())
             out(f"{speeds[i]:<9.1f}{row}")
     if best is not None and speed is not None:
         name, off = best

@@ -67,12 +67,12 @@ def vectors(
         if not output.lower().endswith(FLO):
             raise InputError(f"`form` is missing; the vectors can be {', '.join(FORMS)}")
         form = "flo"
-    found = frames_at(pattern, input, output)
+    source = frames_at(pattern, input, output)
     request = VectorsRequest(
-        pattern=found.pattern,
+        pattern=source.pattern,
         output=output,
         form=form,
-        input=found.input,
+        input=source.input,
         max_displace=max_displace,
         overwrite=overwrite,
         resume=resume,
@@ -80,7 +80,7 @@ def vectors(
     run = request.open(adapter)
     clip, files = run.clip, run.output
     console = Console(quiet, verbose)
-    console.say(found.text, input.remark)
+    console.say(source.text, input.remark)
     console.detail(f"settings: {files.settings}")
     started = time.perf_counter()
     made_of, settings = clip.dependencies.every(), json.loads(files.settings)

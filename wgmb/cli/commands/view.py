@@ -81,9 +81,9 @@ def view(
         state = viewer.State.read(config)
     if what is not None:
         if Path(what).is_dir():
-            found = frames_at(what, input)
-            what, input = found.pattern, replace(input, also=found.input.also)
-            Console().say(found.text)
+            source = frames_at(what, input)
+            what, input = source.pattern, replace(input, also=source.input.also)
+            Console().say(source.text)
         state = state.opened(what, input.max_mb)
     state = state.with_options(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
     if state.is_video and config is None and blur.method is None:

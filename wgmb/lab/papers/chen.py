@@ -41,8 +41,8 @@ def chen(lab: Laboratory, report: Report, size: tuple[int, int], moments: int = 
         case = Case("dive", frame, shutter, frame.color, "", scene_frame)
         lab.tell(f"dive, moment {k + 1} of {moments}")
         blurs = {c: c.blur(8, shutter, lab.device) for c in both}
-        for c, found in lab.passes(case, blurs).items():  # compiles
-            for label, pass_ in found.items():
+        for c, by_label in lab.passes(case, blurs).items():  # compiles
+            for label, pass_ in by_label.items():
                 passes.setdefault((c.label, label), []).append(pass_)
         timers = [lab.timer(case, blur, c) for c, blur in blurs.items()]
         for c, s in zip(both, lab.least(timers), strict=True):

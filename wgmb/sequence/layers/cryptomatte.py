@@ -72,11 +72,11 @@ def ids(crypto: Attributes, value: str, folders: Iterable[Path] = ()) -> list[in
             f"{_some(manifest) or 'nothing; give the id as 0x and eight digits'}"
             f"{did_you_mean(value, manifest)}"
         )
-    found = {name: manifest[name] for name in names}
-    for name, id_ in found.items():
+    by_name = {name: manifest[name] for name in names}
+    for name, id_ in by_name.items():
         if not isinstance(id_, str) or not re.fullmatch(r"[0-9a-fA-F]{1,8}", id_):
             raise InputError(f"Cryptomatte {crypto['name']!r}: bad id for {name!r} in {its}")
-    return [int(str(id_), 16) for id_ in found.values()]
+    return [int(str(id_), 16) for id_ in by_name.values()]
 
 
 def coverage(

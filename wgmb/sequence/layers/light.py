@@ -134,14 +134,14 @@ def find(names: Iterable[str], picture: str | None) -> LightPasses:
             if end := layers.ending(name, _PASSES):
                 ends.setdefault(end, tuple(rgb[:3]))
     there = ends | there
-    found: dict[str, Light] = {}
+    by_field: dict[str, Light] = {}
     lacking: dict[str, str] = {}
     for family in _FAMILIES:
         direct, indirect, color = (
             next((there[name] for name in wanted if name in there), None)
             for wanted in (family.direct, family.indirect, family.color)
         )
-        if direct is None or family.light in found:
+        if direct is None or family.light in by_field:
             continue
         if color is None:
             lacking.setdefault(
@@ -151,14 +151,14 @@ def find(names: Iterable[str], picture: str | None) -> LightPasses:
             )
             continue
         lights = tuple(one for one in (direct, indirect) if one is not None)
-        found[family.light] = Light(family.light, lights, color, family.is_multiplied)
-    if (found or lacking) and not is_beauty:
+        by_field[family.light] = Light(family.light, lights, color, family.is_multiplied)
+    if (by_field or lacking) and not is_beauty:
         return LightPasses(
             (), f"the layer {layer} is not the whole picture: its passes of light are left alone"
         )
-    missing = "; ".join(text for kind, text in lacking.items() if kind not in found)
+    missing = "; ".join(text for kind, text in lacking.items() if kind not in by_field)
     unused = tuple(_layer(there[name]) for name in _UNUSED if name in there)
-    return LightPasses(tuple(found.values()), missing or None, unused)
+    return LightPasses(tuple(by_field.values()), missing or None, unused)
 
 
 def is_pass(layer: str) -> bool:

@@ -156,8 +156,8 @@ class Masks:
     def _of_file(self, source: FrameFile, file: Path) -> np.ndarray:
         window, display = source.data_window, source.display_window
         if file.suffix.lower() == ".exr":
-            found = read([file], source.number, None, self.max_mb)
-            mask = next((one for one in found if one.view == source.view), found[0])
+            sources = read([file], source.number, None, self.max_mb)
+            mask = next((one for one in sources if one.view == source.view), sources[0])
             plane = grey(mask.channels).astype(np.float32)
             if mask.display_window == display:
                 return laid(plane, mask.data_window, window)

@@ -74,11 +74,11 @@ def names_of(file: Exr) -> tuple[str, ...]:
 
     InputError where the attributes contradict the documentation.
     """
-    found: dict[str, None] = {}
+    views: dict[str, None] = {}
     for part in file.parts:
         view = _view(part)
         for name in [view] if view is not None else _multi(part):
-            found[name] = None
+            views[name] = None
             if view is None and (not name or "." in name or name != "".join(name.split())):
                 raise InputError(
                     f"{file.path}: the name of a view must have no periods or blanks, got {name!r}"
@@ -87,12 +87,12 @@ def names_of(file: Exr) -> tuple[str, ...]:
                 raise InputError(
                     f"{file.path}: the name of a view, {name!r}, cannot be part of a file's name"
                 )
-    if found and _view(file.parts[0]) is None and not _multi(file.parts[0]):
+    if views and _view(file.parts[0]) is None and not _multi(file.parts[0]):
         raise InputError(
             f"{file.path}: the first part, {file.parts[0].name!r}, must name its view, "
-            f"as the others do: {', '.join(found)}"
+            f"as the others do: {', '.join(views)}"
         )
-    return tuple(found)
+    return tuple(views)
 
 
 def by_view(file: Exr, layers: Iterable[str] = ()) -> dict[str | None, Places]:
@@ -103,13 +103,13 @@ def by_view(file: Exr, layers: Iterable[str] = ()) -> dict[str | None, Places]:
     it begins one of the `layers`. InputError where two channels are the same one.
     """
     layers = [name.lower() for name in layers]
-    found: dict[str | None, list[tuple[str, str, Place]]] = {v: [] for v in names_of(file)}
+    members: dict[str | None, list[tuple[str, str, Place]]] = {v: [] for v in names_of(file)}
     for part in file.parts:
         view, multi = _view(part), _multi(part)
         for name in part.channels:
             layer, of, component = split(name, view, multi, part.channels)
-            found.setdefault(of, []).append((layer, component, (part, name)))
-    return {of: _named(file, of, channels, layers) for of, channels in found.items()}
+            members.setdefault(of, []).append((layer, component, (part, name)))
+    return {of: _named(file, of, channels, layers) for of, channels in members.items()}
 
 
 def _named(

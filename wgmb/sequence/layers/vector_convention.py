@@ -94,7 +94,7 @@ class ConventionFinder:
 
         `which` of the readings of the vectors is tested; None if there are not so many.
         """
-        there, found = self._stored.files.on_disk, None
+        there, finding = self._stored.files.on_disk, None
         evidence: list[vector_test.Evidence] = []
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
@@ -102,7 +102,7 @@ class ConventionFinder:
                 if not named:
                     continue
                 if len(named) <= which:
-                    return found
+                    return finding
                 own = named[which]
                 if self._wanted.is_told:
                     return self._untested(source, own)
@@ -111,11 +111,11 @@ class ConventionFinder:
                 is_named = vectors.is_direction_named(
                     self._stored.own(source), own, source.reference_channel
                 )
-                found = vector_test.decide(own, evidence, has_both=has_both, is_named=is_named)
+                finding = vector_test.decide(own, evidence, has_both=has_both, is_named=is_named)
                 seen = {side for e in evidence for side in e.sides}
-                if found.sure and found.vectors == own and (len(seen) == 2 or not has_both):
+                if finding.sure and finding.vectors == own and (len(seen) == 2 or not has_both):
                     break
-        return found
+        return finding
 
     def _untested(self, source: FrameFile, own: vectors.Vectors) -> vector_test.ConventionFinding:
         """The finding about vectors of which everything was told, except perhaps their unit."""
@@ -200,9 +200,9 @@ class ConventionFinder:
         total = depth_order.Votes()
         for number in dict.fromkeys(there[i] for i in (0, len(there) // 2, -1)):
             with contextlib.suppress(InputError, OSError):  # its turn to fail comes
-                found = self._depth_votes(self._named(number)[0], finding.vectors)
-                total += found or depth_order.Votes()
-                if found is None or total.is_enough:
+                votes = self._depth_votes(self._named(number)[0], finding.vectors)
+                total += votes or depth_order.Votes()
+                if votes is None or total.is_enough:
                     break
         if not total.is_reversed:
             return "planar"

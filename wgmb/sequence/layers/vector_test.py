@@ -354,12 +354,12 @@ def _search(tested: Sequence[Evidence], probes: _Probes, has_both: bool) -> list
     least = min(map(min, rough.values()))
     if least > _HARDLY * stated:
         return []
-    most, found = _NEARBY * least, []
+    most, readings = _NEARBY * least, []
     for (unit, flip, turned), differences in rough.items():
         if min(differences) <= most:
             middle = float(unit.multiples[int(np.argmin(differences))])
-            found += _refined(probes, unit, flip, turned, middle)
-    return found
+            readings += _refined(probes, unit, flip, turned, middle)
+    return readings
 
 
 def _refined(

@@ -171,7 +171,7 @@ def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> d
     places or directions in space. An alpha that is 1 everywhere is no channel of theirs. Of a
     larger layer, and of the channels without one, parts count, by the name "x,y" of two channels.
     """
-    found: dict[str, str] = {}
+    by_layer: dict[str, str] = {}
     for layer, all_members in layers(channels, near).items():
         is_opaque = component(all_members[-1]) in ("a", "alpha") and np.all(
             channels[all_members[-1]] == 1
@@ -182,8 +182,8 @@ def candidates(channels: Mapping[str, np.ndarray], near: str | None = None) -> d
         else:
             parts = _parts(members)
         reasons = {name: _likeness(channels, part) for name, part in parts.items()}
-        found |= {name: reason for name, reason in reasons.items() if reason}
-    return found
+        by_layer |= {name: reason for name, reason in reasons.items() if reason}
+    return by_layer
 
 
 def _parts(members: list[str]) -> dict[str, list[str]]:
@@ -197,9 +197,9 @@ def _parts(members: list[str]) -> dict[str, list[str]]:
     lead = f"{layer}." if layer else ""
     own = sorted({name.removeprefix(lead) for name in members} - {"Z"})
     parts = {stem: part for name in own for stem, part in _called_as_axes(name, own)}
-    rest = [n for n in own if not (_NO_VECTOR.fullmatch(n) or is_depth(n))]
-    if not parts and not layer and len(rest) in (2, 3):
-        parts = {"": rest}
+    components = [n for n in own if not (_NO_VECTOR.fullmatch(n) or is_depth(n))]
+    if not parts and not layer and len(components) in (2, 3):
+        parts = {"": components}
     kept = [part for stem, part in parts.items() if len(part) == 2 or not is_of_space(stem)]
     return {f"{lead}{part[0]},{lead}{part[1]}": [lead + name for name in part] for part in kept}
 
@@ -265,15 +265,15 @@ def _layers(names: Iterable[str], near: str | None, wanted: str | None) -> dict[
     Two channels that are `wanted`, with a comma between them, are a layer of that name.
     """
     names = list(names)
-    found, pairs = layers(names, near), dict[str, list[str]]()
+    by_layer, pairs = layers(names, near), dict[str, list[str]]()
     for name in sorted(names):
         for form in (_PAIR, _PAIR_BEHIND):
             if (m := form.fullmatch(name)) and ending(m["stem"], STEMS):
                 pairs.setdefault(".".join(filter(None, (m["layer"], m["stem"]))), []).append(name)
                 break
-    found |= {k: members for k, members in pairs.items() if len(members) == 2}
+    by_layer |= {k: members for k, members in pairs.items() if len(members) == 2}
     two = (wanted or "").split(",")
-    return found | ({wanted: two} if wanted and len(two) == 2 and set(two) <= set(names) else {})
+    return by_layer | ({wanted: two} if wanted and len(two) == 2 and set(two) <= set(names) else {})
 
 
 def _find(by_layer: Mapping[str, list[str]], convention: Convention) -> dict[str, list[str]]:
@@ -381,26 +381,26 @@ def channels_of(
         sides = [("next", convention.next)]
         if convention.prev and convention.prev != convention.next:
             sides.append(("prev", convention.prev))
-        found = [(side, members, where) for side, where in sides if where]
+        parts = [(side, members, where) for side, where in sides if where]
     else:
-        found = []
+        parts = []
         there = _find(by_layer, convention)
         if not there and not any(_find(by_layer, c) for c in CONVENTIONS.values() if c.components):
             there = _find(by_layer, CONVENTIONS["plain"])  # names of no program's own
         for name, members in there.items():
             if convention.prev and convention.prev != convention.next:
-                found += [("prev", members, convention.prev), ("next", members, convention.next)]
+                parts += [("prev", members, convention.prev), ("next", members, convention.next)]
             elif name in _BACKWARD:
-                found.append(("prev", members, convention.prev))
+                parts.append(("prev", members, convention.prev))
             else:
-                found.append(("next", members, convention.next))
-    if not found:
+                parts.append(("next", members, convention.next))
+    if not parts:
         raise MissingLayerError(
             f"no {vectors.convention} vectors ({' or '.join(convention.stems[:6])}); "
             f"available: {', '.join(map(repr, by_layer))}"
         )
     result: dict[str, tuple[str, str]] = {}
-    for side, members, (x, y) in found:
+    for side, members, (x, y) in parts:
         if max(x, y) >= len(members):
             raise InputError(f"vector layer needs {max(x, y) + 1} components, has {len(members)}")
         result.setdefault(side, (members[x], members[y]))
