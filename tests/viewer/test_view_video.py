@@ -266,13 +266,17 @@ def fast(path):
     return clips.write(path, frames, [Fraction(n, 24) for n in range(6)])
 
 
-def test_its_command_writes_the_bytes_that_it_shows_of_something_fast(tmp_path):
+@pytest.mark.parametrize("method", [None, "gather"])
+def test_its_command_writes_the_bytes_that_it_shows_of_something_fast(tmp_path, method):
     clip, made = fast(tmp_path / "fast.mp4"), tmp_path / "made.mkv"
     state = put(State().opened(str(clip)), panel=False, frame=3.0)
+    state = state if method is None else state.with_method(method)
     viewer = offscreen(state, (320, 96))
     light = settled(viewer)
+    words = viewer.state.command(str(made))
+    assert ("--method" in words) == (method is not None)
     viewer.stage.choices.close()
-    assert main([*state.command(str(made)), "--codec", "ffv1", "--quiet"]) == 0
+    assert main([*words, "--codec", "ffv1", "--quiet"]) == 0
     device = gpu.open_device()
     footage, planes = VideoReader(made), Planes(device)
     written = dict(footage.pictures())[3]

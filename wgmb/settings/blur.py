@@ -102,12 +102,15 @@ class BlurSettings:
             unset["shading"] = "off"
         return replace(self, **unset)
 
-    def at_edges(self, shutter_: Shutter, device: wgpu.GPUDevice) -> Blur | None:
-        """The Blur of pictures with edges of motion: gather there; None for options of others."""
+    def for_edges(self) -> Self:
+        """Return a copy for pictures with edges of motion, `for_pictures`: gather there."""
         own = getattr(self, "where", None) or "edges"  # a method's option
+        return replace(self, method="gather", where=own).for_pictures()
+
+    def at_edges(self, shutter_: Shutter, device: wgpu.GPUDevice) -> Blur | None:
+        """The Blur of pictures with edges of motion; None for options of another method."""
         try:
-            settings = replace(self, method="gather", where=own)
-            return settings.for_pictures().make(shutter_, device)
+            return self.for_edges().make(shutter_, device)
         except InputError:
             return None
 

@@ -171,9 +171,7 @@ class Exposures:
         """The Blur of each cell."""
 
         def blur_of(cell: Cell) -> Blur:
-            blur = self._blur
-            if self._at_edges is not None and frames.has_edges(cell):
-                blur = self._at_edges
+            blur = frames.blur_of(cell, self._blur, self._at_edges)
             self._used.add(blur.method.name)
             return blur
 

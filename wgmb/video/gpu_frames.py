@@ -105,6 +105,10 @@ class VideoFrames:
         gpu.hand_in(self._device, encoder)
         return True
 
+    def blur_of(self, cell: Cell, blur: Blur, at_edges: Blur | None) -> Blur:
+        """The Blur of a cell: `at_edges`, if there is one, where its motion has edges."""
+        return at_edges if at_edges is not None and self.has_edges(cell) else blur
+
     def has_edges(self, cell: Cell) -> bool:
         """True if the motion of a picture has edges within its exposure, as gather looks for."""
         if self._source is None or self._is_still(cell.index):

@@ -146,6 +146,11 @@ class Choices:
             return False
         return METHODS[QUICKEST].needs <= METHODS[method].needs  # others add samples meanwhile
 
+    def has_edges_gathered(self, state: State) -> bool:
+        """True if pictures of a video whose motion has edges are blurred with gather."""
+        is_suited = state.is_video and state.is_method_suited
+        return is_suited and state.video.is_by_place(self._device)
+
     def rivals(self, state: State) -> list[str]:
         """Return the images that the result can be compared with."""
         sharp = ["sharp"] if "sharp" in self.looks(state) else []
@@ -156,7 +161,9 @@ class Choices:
     def possible(self, state: State) -> State:
         """The same state; a method or look that is not to be had is replaced by one that is."""
         methods = self.methods(state)
-        if methods and state.method not in methods:
+        if state.is_video and state.is_method_suited:
+            state = state.suited_by(state.video.chosen(self._device)[0].method)
+        elif methods and state.method not in methods:
             usual = default_method(self.subject(state).has(state))
             state = state.with_method(usual if usual in methods else methods[0])
         if state.look not in (looks := self.looks(state)):

@@ -365,7 +365,7 @@ class Viewer:
             self._requested = state
             return
         self.state = possible = drawn.corrected(state)
-        if possible.method != state.method:
+        if possible.method != state.method and not state.is_method_suited:
             self.say(f"method {state.method!r} is not available here")
         report = drawn.report
         if self._recent is not None and not drawn.state.is_scene:

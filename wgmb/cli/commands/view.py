@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from ... import gpu
 from ...errors import DeviceError
 from ...extras import needed_by
 from ...settings import size_of
@@ -86,9 +85,6 @@ def view(
             Console().say(source.text)
         state = state.opened(what, input.max_mb)
     state = state.with_options(vars(input) | vars(blur) | vars(shutter) | vars(color) | vars(video))
-    if state.is_video and config is None and blur.method is None:
-        settled, _ = video.chosen(gpu.open_device(adapter))
-        state = state.with_method(settled.method)
     if fps is not None:
         state = viewer.at_rate(state, fps)
     state = replace(state, shutter=state.shutter.resolved(fps=state.fps))

@@ -79,6 +79,19 @@ class Blurs:
             raise InputError(f"method {method!r} is not available here; use {', '.join(allowed)}")
         if quick is not None:
             settings = self._quick(settings, quick)
+        return self._kept_blur(slot, name, settings, shutter, size)
+
+    def at_edges(self, slot: str, name: str, state: State, size: tuple[int, int]) -> Blur | None:
+        """The Blur of pictures with edges of motion; None for options of another method."""
+        try:
+            return self._kept_blur(slot, name, state.blur.for_edges(), state.shutter.make(), size)
+        except InputError:
+            return None
+
+    def _kept_blur(
+        self, slot: str, name: str, settings: BlurSettings, shutter: Shutter, size: tuple[int, int]
+    ) -> Blur:
+        """The Blur of these settings, kept for the next time."""
         kept = slot, name == "perceived"  # each has the sums of a picture of its own
         key = kept, settings
         held = self._blurs.pop(key, None)
@@ -102,12 +115,12 @@ class Blurs:
             self._blurs.popitem(last=False)
 
     @contextmanager
-    def kept_if_done(self, blur: Blur):
-        """Forget the Blur if its drawing is dropped: its data of a frame are incomplete then."""
+    def kept_if_done(self, *blurs: Blur | None):
+        """Forget the Blurs if their drawing is dropped: their data of a frame are incomplete."""
         try:
             yield
         except DroppedError:
-            for key in [key for key, held in self._blurs.items() if held.blur is blur]:
+            for key in [key for key, held in self._blurs.items() if held.blur in blurs]:
                 del self._blurs[key]
             raise
 

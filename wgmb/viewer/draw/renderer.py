@@ -310,7 +310,8 @@ class Renderer:
             return []
         method = METHODS[name if name in METHODS else state.method]
         states = seen_frames(state) if name == "perceived" else [state]
-        asked = states, state.shutter.make(), "neighbours" in method.uses
+        gathers = name not in METHODS and self.choices.has_edges_gathered(state)
+        asked = states, state.shutter.make(), gathers or "neighbours" in method.uses
         known = subject.stamp(*asked)
         while full and subject.busy:
             time.sleep(_SHORT)
@@ -343,25 +344,32 @@ class Renderer:
             return
         stand_in = QUICKEST if coming.is_preview else None
         blur = self._blurs(slot, name, state, size, self.detail.level if quick else None, stand_in)
+        at_edges = None
+        if isinstance(subject, VideoSubject) and name in ("result", "perceived"):
+            is_fine = stand_in is None and not (quick and self.detail.is_slow)
+            if is_fine and self.choices.has_edges_gathered(state):
+                at_edges = self._blurs.at_edges(slot, name, state, size)
+            subject.at_edges = at_edges
         coming.texture = self._images.texture(coming.name, size, blur.output)
         if name == "perceived" and (eye := state.eye):
             if state.is_scene:  # of its own, so that what else is drawn keeps its moment
                 subject = self._past = self._past or SceneSubject(self.device)
             coming.total = len(seen_frames(state))
             by = view, blur, antialias
-            with self._blurs.kept_if_done(blur):
+            with self._blurs.kept_if_done(blur, at_edges):
                 coming.done = self._perceived[slot].draw(
                     coming.texture, state, eye, subject, *by, seconds, timing, known
                 )
             return
         budget = coming.done, float("inf") if quick else seconds
         coming.total = blur.samples
-        with self._blurs.kept_if_done(blur):
+        with self._blurs.kept_if_done(blur, at_edges):
             coming.done = subject.draw(blur, coming.texture, budget, timing)
 
     def _label(self, name: str, state: State) -> str:
         if name == "result":
-            return state.method
+            at_edges = self.choices.has_edges_gathered(state) and state.method != "gather"
+            return f"{state.method}, gather at edges" if at_edges else state.method
         if name == "perceived":
             return f"{state.method}, perceived"
         if name == REFERENCE and state.eye:

@@ -82,7 +82,8 @@ class Drawn:
         """A state, with impossible settings replaced as in `self.state`."""
         asked, found = self.request.state, self.state
         if asked.method == state.method != found.method:
-            state = state.with_method(found.method)
+            is_suited = state.is_method_suited
+            state = replace(state.with_method(found.method), is_method_suited=is_suited)
         for name in ("look", "eyes", "against"):
             if getattr(asked, name) == getattr(state, name):
                 state = replace(state, **{name: getattr(found, name)})

@@ -99,12 +99,16 @@ def animation(ui: Widgets, state: State, info: Info) -> State:
     return ui.slide(state, "speed", 0.02, 4, "x %.2f", log=True, label="playback")
 
 
+AUTO = "auto"
+"""As a method: the one that suits the motion of a video."""
+
+
 # ---- how it is blurred ----------------------------------------------------------------------
 
 
 def blur(ui: Widgets, state: State, info: Info) -> State:
     """The method and its options."""
-    state = state.with_method(ui.combo("method", state.method, info.available.methods))
+    state = _method(ui, state, info)
     state = _samples(ui, state)
     for name, option in info.available.options.items():
         if name == "show":
@@ -131,6 +135,18 @@ def blur(ui: Widgets, state: State, info: Info) -> State:
     ui.keep("max_blur")
     imgui.end_disabled()
     return state.with_settings(max_blur=(most if changed else on) if limit else None)
+
+
+def _method(ui: Widgets, state: State, info: Info) -> State:
+    """The method; of a video also "auto", which leaves it to the motion, as `wgmb blur` does."""
+    methods = info.available.methods
+    if not state.is_video:
+        return state.with_method(ui.combo("method", state.method, methods))
+    name = AUTO if state.is_method_suited else state.method
+    chosen = ui.combo("method", name, [AUTO, *methods])
+    if chosen == name:
+        return state
+    return state.suited_by(state.method) if chosen == AUTO else state.with_method(chosen)
 
 
 def _samples(ui: Widgets, state: State) -> State:

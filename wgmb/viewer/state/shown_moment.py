@@ -43,6 +43,8 @@ class ShownMoment:
     """The moment [frame intervals]; of a video the output frame, from 0 on."""
     fps: float = 24.0
     """Of a video: of the output, whose interval the shutter is in."""
+    is_method_suited: bool = False
+    """Of a video: no method is set, so that it suits the motion, as in `wgmb blur`."""
     own_times: bool = False
     """Of a video: `fps` is "source", an output frame for each picture, at its time."""
 

@@ -53,17 +53,19 @@ class Kept:
     shutter: ShutterSettings
     flow: str
     flow_quality: str
+    is_method_suited: bool = False
 
     @staticmethod
     def of(state: State) -> Kept:
         """Those of a state."""
-        video = state.video
-        return Kept(state.blur, state.shutter, video.flow, video.flow_quality)
+        video, is_suited = state.video, state.is_method_suited
+        return Kept(state.blur, state.shutter, video.flow, video.flow_quality, is_suited)
 
     def put_into(self, state: State) -> State:
         """The state with these settings."""
         video = replace(state.video, flow=self.flow, flow_quality=self.flow_quality)
-        return replace(state, blur=self.blur, shutter=self.shutter, video=video)
+        suited, shutter = self.is_method_suited, self.shutter
+        return replace(state, blur=self.blur, shutter=shutter, video=video, is_method_suited=suited)
 
 
 @dataclass(frozen=True)
@@ -226,7 +228,9 @@ class State(ShownMoment):
         if self.tone == self.suited_tone:  # what was as the last source asks for follows this one
             state = replace(state, tone=state.suited_tone)
         follows = {n: v for n, v in suited.items() if self.setting(n) == was[n]}
+        is_suited = state.is_video and (self.is_method_suited or self.method == was["method"])
         state = state.with_method(follows.pop("method", state.method)).with_settings(**follows)
+        state = replace(state, is_method_suited=is_suited)
         if state.is_scene:
             plain, loop = State(), builtin.make(source).loop
             if loop:
@@ -270,7 +274,8 @@ class State(ShownMoment):
         for name, value in changes.items():
             groups.setdefault(GROUP_OF[name], {})[name] = value
         new = {group: replace(getattr(self, group), **some) for group, some in groups.items()}
-        return replace(self, **new)
+        is_suited = self.is_method_suited and "method" not in changes
+        return replace(self, **new, is_method_suited=is_suited)
 
     def with_video(self, **changes: Any) -> State:
         """The same with others of the VideoSettings, at the same time in the video."""
@@ -285,10 +290,14 @@ class State(ShownMoment):
     def with_method(self, method: str) -> State:
         """The same with another method, whose options are its own."""
         if method == self.method:
-            return self
+            return replace(self, is_method_suited=False)
         return self.with_settings(
             method=method, **{name: DEFAULTS[name] for name in METHOD_OPTIONS}
         )
+
+    def suited_by(self, method: str) -> State:
+        """The same of a video, whose method is not set, and so is this one."""
+        return replace(self.with_method(method), is_method_suited=True)
 
     def with_options(self, options: dict[str, Any]) -> State:
         """The same with options of the command line, those that are not their defaults."""
@@ -308,6 +317,8 @@ class State(ShownMoment):
         given: dict[str, object] = {"scene" if self.is_scene else "pattern": self.source}
         for group in ("scene" if self.is_scene else "input", "blur", "shutter"):
             given |= written(group, getattr(self, group))
+        if self.is_video and self.is_method_suited:
+            del given["method"]
         given["fps"] = video_time.SOURCE if self.own_times else str(video_time.rate(self))
         given |= written("color", self.color)
         if self.is_video:
@@ -360,6 +371,7 @@ class State(ShownMoment):
         state = State(source, **values)
         if state.is_video:
             state = video_time.completed(state, {*given, *tables.get("view", {})})
+            state = replace(state, is_method_suited="method" not in given)
         Cone(state.cone_rate, state.cone_peak)  # says what is wrong with them
         video_time.check(state)
         saved.check_words("method", state.blur.method, METHODS)

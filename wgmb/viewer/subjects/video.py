@@ -48,7 +48,8 @@ class VideoSubject:
     """A video: its output frames, which wgmb/video exposes as for `wgmb blur`.
 
     Where the motion of a picture is not known yet the picture is shown as it is; `stamp` changes
-    when more is known. `finding`: the source of motion, and peculiarities of the file.
+    when more is known. `finding`: the source of motion, and peculiarities of the file. `at_edges`:
+    blurs pictures whose motion has edges, if not the Blur of `draw`.
     """
 
     def __init__(self, device: wgpu.GPUDevice, state: State):
@@ -65,6 +66,7 @@ class VideoSubject:
         self._shots = KnownShots(self._reader, self._times(state), self._maker.known)
         self._motion = KnownMotion(device, self._maker.known) if self._moves else None
         self._plain = Blur("tap", device=device)
+        self.at_edges: Blur | None = None
         self._expand(Expansion())
         self._state = state
         self._exposed: VideoExposure | None = None
@@ -247,8 +249,13 @@ class VideoSubject:
         """Draw the exposure of the present output frame with `blur`, all its samples."""
         shutter = blur.shutter
         cells = self._exposure(self._state, shutter).cells
+
+        def blur_of(cell: Cell) -> Blur:
+            return self._frames.blur_of(cell, blur, self.at_edges)
+
         try:
-            self._put(self._light(self._frames, cells, lambda _: blur, timing), target)
+            light = self._light(self._frames, cells, blur_of, timing)
+            self._put(light, target)
         finally:
             blur.shutter = shutter
         return blur.samples

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -244,8 +245,9 @@ class KnownMotion:
         """None: it is given with the motion."""
 
     def change(self, index: int) -> float:
-        """Infinite: nobody asks where the motion has edges."""
-        return np.inf
+        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+        finding = self._known(index)
+        return math.inf if finding is None else finding.change
 
     def is_unfollowed(self, index: int, held: object) -> bool:
         """False: the viewer has no report."""

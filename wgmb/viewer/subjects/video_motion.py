@@ -6,6 +6,7 @@ those that cannot be decoded mean the same. Any picture may be asked for; neighb
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -46,6 +47,8 @@ class PictureFinding:
     """It repeats the picture before, or cannot be decoded: those beside it reach over its time."""
     holdout: np.ndarray | None = None
     """(height, width): 1 stays sharp; of pictures with motion."""
+    change: float = math.inf
+    """The greatest change of the motion within a tile [px], infinite if not known."""
     time: float | None = None
     """The time that a cadence gives it, on the video's clock [s]; None: that in the file."""
 
@@ -116,6 +119,7 @@ class PictureFinder:
             begins_shot=not shots.same_shot(here, here - 1),
             ends_shot=not shots.same_shot(here, here + 1),
             holdout=None if found is None or not self._held else self._held(here),
+            change=math.inf if found is None or not self._motion else self._motion.change(here),
             time=None if time == self._times[number] else time,
         )
 
