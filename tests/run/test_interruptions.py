@@ -1,4 +1,4 @@
-"""Killed and interrupted runs leave whole files only, and go on later."""
+"""Interrupted runs leave whole files only; killed ones are tried by the soak, in test_soak.py."""
 
 import contextlib
 import itertools
@@ -38,20 +38,6 @@ def arguments(pattern, out, *more):
 
 def made(out) -> int:
     return len(list(out.glob("o.*.exr")))
-
-
-@pytest.mark.full
-def test_killed_runs_leave_whole_files_only_and_resume_to_the_same_bytes(tmp_path, long_shot):
-    pattern, whole = long_shot
-    out = tmp_path / "out"
-    for frames in (1, 23):
-        process = make.begun(arguments(pattern, out, "--resume"), lambda n=frames: made(out) >= n)
-        process.kill()
-        process.communicate()
-        for path in out.glob("o.*.exr"):
-            assert path.read_bytes() == whole[path.name]
-    assert app.main(list(map(str, arguments(pattern, out, "--resume", "-q")))) == 0
-    assert {p.name: p.read_bytes() for p in out.iterdir()} == whole
 
 
 def ignore_ctrl_c():
