@@ -1,8 +1,6 @@
 // The G-buffer of one instant of a scene: colour, depth, normal and object index.
-//#include common/frame.wgsl
-//#include scene/trace.wgsl
+//#include scene/rays.wgsl
 
-@group(1) @binding(3) var<uniform> view: View;
 @group(1) @binding(4) var color: Color;                                     // linear
 @group(1) @binding(5) var depth: texture_storage_2d<r32float, write>;       // along the view axis
 @group(1) @binding(6) var normal: texture_storage_2d<rgba32float, write>;   // in the world
@@ -11,10 +9,6 @@
 alias Color = texture_storage_2d<rgba32float, write>;
 
 override CENTRED: bool = true;  // one of the rays is through the pixel's centre: their number a side is odd
-
-struct View {
-    top: u32,       // first row of the image that is drawn, the dispatch has as many as are drawn [px]
-}
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -30,8 +24,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3f(0.0);
     var i = 0u;
     loop {
-        let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
-        let ray = camera_ray(vec2f(px) + within, camera);
+        let ray = ray_of(px, i, camera);
         let hit = nearest(ray, now);
         sum += radiance(hit, ray, now);
         if CENTRED && i == rays / 2u { seen = hit; }

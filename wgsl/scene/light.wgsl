@@ -1,16 +1,10 @@
 // The passes of light of one instant of a scene: the light on its surfaces, and their colour.
-//#include common/frame.wgsl
-//#include scene/trace.wgsl
+//#include scene/rays.wgsl
 
-@group(1) @binding(3) var<uniform> view: View;
 @group(1) @binding(4) var light: Light;     // sun with its shadow and ambient light; 0 for the sky
 @group(1) @binding(5) var albedo: Light;    // its factor
 
 alias Light = texture_storage_2d<rgba32float, write>;
-
-struct View {
-    top: u32,       // first row of the image that is drawn, the dispatch has as many as are drawn [px]
-}
 
 @compute @workgroup_size(WG_X, WG_Y)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -23,8 +17,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var color = vec3f(0.0);
     var i = 0u;
     loop {
-        let within = (vec2f(vec2u(i % scene.rays, i / scene.rays)) + 0.5) / f32(scene.rays);
-        let ray = camera_ray(vec2f(px) + within, camera);
+        let ray = ray_of(px, i, camera);
         let hit = nearest(ray, now);
         if hit.depth < BACKGROUND_DEPTH {
             let one = lighting(hit, ray, normalize(ray.direction), now);
