@@ -283,20 +283,30 @@ def raised(
     Each takes that of the likest of the nine pixels around it.
     """
     rows, columns = box or (slice(0, large.size[1]), slice(0, large.size[0]))
-    at = []
+    at, nearest = [], []
     for part, few, many in zip((columns, rows), small.size, large.size, strict=True):
         centres = np.arange(part.start, part.stop, dtype=np.float32) + 0.5
         at.append(centres * np.float32(few / many) - 0.5)
-    (x, y), here = at, large.here[rows, columns]
-    width, height = small.size
+        nearest.append(np.rint(at[-1]))
+    here, (width, height) = large.here[rows, columns], small.size
     best = np.full(here.shape, np.inf, np.float32)
-    places = np.zeros(here.shape, np.int32)
-    for down, right in NEAR:
-        column, row = np.rint(x).astype(np.int32) + right, np.rint(y).astype(np.int32) + down
-        far = AWAY * np.hypot(*np.meshgrid(column - x, row - y)).astype(np.float32)
-        column, row = column.clip(0, width - 1), row.clip(0, height - 1)
-        cost = _cv().absdiff(small.here[row][:, column], here) + far
-        takes = cost < best
-        np.copyto(places, row[:, None] * width + column, where=takes)
+    likest = np.zeros(here.shape, np.uint8)  # of NEAR
+    steps = np.array(NEAR)
+    down, right = (
+        (middle.astype(np.intp) + step[:, None]).clip(0, many - 1)
+        for middle, step, many in zip(nearest[::-1], steps.T, (height, width), strict=True)
+    )
+    for k, (step_down, step_right) in enumerate(NEAR):
+        x, y = (
+            (m + s - a) ** 2 for m, s, a in zip(nearest, (step_right, step_down), at, strict=True)
+        )
+        cost = np.sqrt(y[:, None] + x)
+        cost *= np.float32(AWAY)
+        cost += _cv().absdiff(small.here[down[k]].take(right[k], axis=1), here)
+        np.copyto(likest, k, where=cost < best)
         np.minimum(best, cost, out=best)
-    return np.take(state.reshape(-1, 4), places, axis=0) * np.float32(small.factor / large.factor)
+    places = np.take_along_axis(down.T, likest, axis=1) * width
+    places += np.take_along_axis(right, likest, axis=0)
+    found = np.take(state.reshape(-1, 4), places, axis=0)
+    found *= np.float32(small.factor / large.factor)
+    return found

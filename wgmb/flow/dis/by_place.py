@@ -72,9 +72,8 @@ class ByPlace:
             one = self._fine.motion(part)
             if found is not None and whole is not None:
                 other = raised(found.level, whole, found.state, box)
-                one = np.where(is_better(part, one, other, MARGIN)[..., None], other, one)
-            there = takes[box].astype(bool)
-            motion[box][there] = one[there]
+                _cv().copyTo(other, is_better(part, one, other, MARGIN).view(np.uint8), one)
+            _cv().copyTo(one, takes[box], motion[box])
         return dominant.put(motion)
 
 

@@ -63,7 +63,7 @@ class Dominant:
     def _motion(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """At columns and rows of the picture."""
         ways = [plane for matrix in self._matrices for plane in ways_of(matrix, x, y[:, None])]
-        return np.stack(ways, axis=2)
+        return _cv().merge(ways)
 
     def _put(self, motion: np.ndarray, region: np.ndarray, box: tuple[int, int, int, int]) -> None:
         """Write it where `region` is true, of the pixels in a box of the level: left, top, width,
@@ -75,9 +75,9 @@ class Dominant:
             for first, n, size in ((top, high, motion.shape[0]), (left, wide, motion.shape[1]))
         )
         plane, size = region.astype(np.uint8), (x1 - x0, y1 - y0)
-        whole = _cv().resize(plane, size, interpolation=_cv().INTER_NEAREST) > 0
+        whole = _cv().resize(plane, size, interpolation=_cv().INTER_NEAREST)
         x, y = (np.arange(a, b, dtype=np.float32) for a, b in ((x0, x1), (y0, y1)))
-        np.copyto(motion[y0:y1, x0:x1], self._motion(x, y), where=whole[..., None])
+        _cv().copyTo(self._motion(x, y), whole, motion[y0:y1, x0:x1])
 
 
 def _hidden(level: Reduced, state: np.ndarray, dominant: np.ndarray) -> np.ndarray:
