@@ -29,10 +29,10 @@ MOST = {
 each wait."""
 
 
-def calls(device, flow, count):
+def calls(device, flow, count, size=SIZE):
     """The calls of each picture."""
     run = wgmb.blur_pictures(
-        synthetic_pictures(SIZE, count), fps_in=24, shutter=180, device=device,
+        synthetic_pictures(size, count), fps_in=24, shutter=180, device=device,
         holdout="none",  # displays take passes more
         **flow_settings(flow, device),
     )  # fmt: skip
@@ -53,6 +53,14 @@ def test_a_picture_asks_for_no_more(device, as_with_a_gpu, flow):
         most = dict.fromkeys(KINDS, 0) | MOST[flow]
         over = {k: n for k, n in counts.items() if k != "dispatches" and n > most[k]}
         assert not over, counts
+
+
+@pytest.mark.full
+def test_nothing_is_made_once_all_numbers_of_frames_were_there(device, as_with_a_gpu):
+    """There are 64 of them (NOISES of common/noise.wgsl), each with a buffer and groups of its own."""
+    for counts in calls(device, "auto", 64 + 2 * TURN + 8, (48, 32))[64 + 2 * TURN : -2]:
+        made = {kind: counts.get(kind, 0) for kind in ("groups", "buffers", "textures", "views")}
+        assert not any(made.values()), counts
 
 
 def test_a_picture_with_a_display_takes_one_submission_more(device, as_with_a_gpu):
