@@ -11,7 +11,7 @@ from twins import dense as twin
 from wgmb.color.srgb import linear, to_display
 from wgmb.errors import InputError
 from wgmb.flow.dense import DenseInverseSearch
-from wgmb.flow.dense.stages import STATE, sizes_of
+from wgmb.flow.dense.levels import STATE, sizes_of
 from wgmb.lab.calls import counted
 from wgmb.run.video import VideoRequest
 from wgmb.settings import BlurSettings
@@ -137,6 +137,24 @@ def test_a_body_before_a_ground_is_found(found):
     far = np.s_[:, : left - SPEED - 24]
     assert np.abs(found.motion[far]).max() < 0.5
     assert found.depth[inside].max() < found.depth[far].min()
+
+
+@pytest.mark.parametrize("pan", [0, 3])
+@pytest.mark.parametrize("is_last", [False, True])
+def test_ground_that_the_only_neighbour_hides_moves_like_all_else(device, pan, is_last):
+    """A body hides it there, and nothing in that picture is like it."""
+    wide, body, sign = soft(WIDTH + pan, HEIGHT, 9, 1), soft(SIDE, SIDE, 8, 2), 1 - 2 * is_last
+    pictures, rows, left = {}, np.s_[36 : 36 + SIDE], (WIDTH - SIDE) // 2
+    for n in (0, 1):
+        first = pan * (1 - n if is_last else n)
+        pictures[n * sign] = picture = wide[:, first : first + WIDTH].copy()
+        picture[rows, left + SPEED * n * sign :][:, :SIDE] = body
+    motion, _ = DenseInverseSearch(device=device).shot(pictures.get)(0)
+    from_here = left + SPEED * sign
+    hidden = motion[36 + 6 : 36 + SIDE - 6, from_here + 6 : from_here + SIDE - 6, 2]
+    assert (np.abs(hidden + pan) < 1).mean() > 0.7
+    inside = motion[36 + 10 : 36 + SIDE - 10, left + 10 : left + SIDE - 10]
+    assert np.abs(inside - [-SPEED, 0, SPEED, 0]).max() < 2
 
 
 @pytest.mark.parametrize("speeds", [(6, -5), (0, 0)])

@@ -12,7 +12,8 @@ from ... import gpu
 from ...errors import InputError
 from ...gpu.textures import KeptViews
 from ..shot import checked
-from .stages import KEPT, DenseStages
+from .levels import KEPT
+from .stages import DenseStages
 
 Textures = tuple[wgpu.GPUTexture, wgpu.GPUTexture | None]  # motion, depth
 Load = Callable[[int], np.ndarray | wgpu.GPUTexture | None]

@@ -14,7 +14,7 @@ LONGEST = 480  # px along the longer side at which matches are compared
 PATCH = 5  # px of these a side of a match, and over which changes of motion are averaged
 AROUND = 25  # px of these a side over which what is compared is averaged
 ROUGH = 2.5  # levels of 255 that the motion's change from a pixel to the next costs, per px
-MOST_ROUGH, MOST_OTHER = constants("compare", "MOST_ROUGH", "MOST_OTHER")
+MOST_ROUGH, MOST_OTHER = constants("choice/compare", "MOST_ROUGH", "MOST_OTHER")
 
 
 def _cv() -> Any:

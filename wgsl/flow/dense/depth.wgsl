@@ -36,10 +36,5 @@ fn distances(px: vec2i) -> vec2f {
     let own = textureLoad(motion, px, 0);
     let place = centred(vec2f(px), vec2f(frame.size));
     let factor = vec2f(frame.size) / vec2f(textureDimensions(small));
-    return turn.there * vec2f(distance(own.xy, factor * moved(0u, place)), distance(own.zw, factor * moved(1u, place)));
-}
-
-fn moved(side: u32, place: vec3f) -> vec2f {
-    let most = summary.most[side];
-    return (most.x * place.x + most.y * place.y + most.same * place.z).xy;
+    return turn.there * vec2f(distance(own.xy, factor * dominant_at(summary.most[0], place)), distance(own.zw, factor * dominant_at(summary.most[1], place)));
 }

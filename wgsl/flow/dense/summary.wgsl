@@ -18,6 +18,11 @@ fn centred(px: vec2f, size: vec2f) -> vec3f {
     return vec3f((px + 0.5 - 0.5 * size) / (0.5 * max(size.x, size.y)), 1.0);
 }
 
+/// The motion of most of the picture [px of the small level] at a place that centred() gives.
+fn dominant_at(most: Most, place: vec3f) -> vec2f {
+    return (most.x * place.x + most.y * place.y + most.same * place.z).xy;
+}
+
 // Tables of counts, one after the other:
 const BINS: u32 = 512u;             // of a table
 const CHANGES: u32 = 0u;            // tables: of changes,

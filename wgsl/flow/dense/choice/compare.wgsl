@@ -1,13 +1,13 @@
 // Costs of two motions on the middle level: of dense inverse search, and of blocks.
 //#include common/frame.wgsl
 //#include flow/dense/differences.wgsl
+//#include flow/dense/choice/thin.wgsl
 
 @group(1) @binding(2) var motion: texture_2d<f32>;      // of the whole picture, by dense inverse search [px]
 @group(1) @binding(3) var state: texture_2d<f32>;       // of this level, with the results of blocks [px]
 @group(1) @binding(4) var areas: texture_2d<f32>;       // of the small level, see turn.wgsl
 @group(1) @binding(5) var output: texture_storage_2d<rgba32float, write>;   // cost of each; 1 near other motion
 
-const MEANS: i32 = 3;           // pixels a side, evenly spaced, whose mean is compared
 const RADIUS: i32 = 2;          // of the squares that are compared [px]
 const ROUGH: f32 = 0.6;         // levels of 255 that the motion's change from a pixel to the next costs, per px,
 const MOST_ROUGH: f32 = 4.0;    // px, beyond which a change costs no more
@@ -18,29 +18,18 @@ const BESIDE: i32 = 4;          // px of the small level around other motion wit
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= frame.size) { return; }
     let px = vec2i(id.xy);
-    let ours = thin(px);
+    let ours = thin(motion, px);
     let its = textureLoad(state, px, 0);
     let last = vec2i(frame.size) - 1;
     let right = min(px + vec2i(1, 0), last);
     let below = min(px + vec2i(0, 1), last);
-    let our_rough = rough(ours, thin(right), thin(below));
+    let our_rough = rough(ours, thin(motion, right), thin(motion, below));
     let its_rough = rough(its, textureLoad(state, right, 0), textureLoad(state, below, 0));
     let our_fit = differences(px, ours, RADIUS);
     let its_fit = differences(px, its, RADIUS);
     let our_cost = our_fit.better + our_rough + min(our_fit.worse, MOST_OTHER);
     let its_cost = its_fit.better + its_rough + min(its_fit.worse, MOST_OTHER);
     textureStore(output, px, vec4f(our_cost, its_cost, is_near(px), 0.0));
-}
-
-/// The mean motion of the whole picture in a pixel [px of this level].
-fn thin(px: vec2i) -> vec4f {
-    let factor = vec2f(textureDimensions(motion)) / vec2f(frame.size);
-    var sum = vec4f(0.0);
-    for (var k = 0; k < MEANS * MEANS; k++) {
-        let part = (vec2f(vec2i(k % MEANS, k / MEANS)) + 0.5) / f32(MEANS);
-        sum += textureLoad(motion, vec2i((vec2f(px) + part) * factor), 0);
-    }
-    return sum / f32(MEANS * MEANS) / factor.xyxy;
 }
 
 fn rough(own: vec4f, right: vec4f, below: vec4f) -> f32 {
