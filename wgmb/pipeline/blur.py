@@ -294,30 +294,27 @@ class Blur:
         inputs: Inputs,
         output: View,
         confidence: View | None = None,
-    ):
-        self._finds = self._record_method(encoder, inputs, output)
-        if confidence is not None and self.confidence:
-            self._judge.encode(encoder, inputs, confidence)
-
-    def _record_method(
-        self, encoder: wgpu.GPUCommandEncoder, inputs: Inputs, output: View
-    ) -> tuple[Word, ...]:
-        """Record the method's passes, or play those of a frame that was as this one; its `finds`.
+    ) -> None:
+        """Record the method's passes, or play those of a frame that was as this one.
 
         Encoders that take the time of passes get each pass by itself.
         """
         repeats = getattr(self.method, "repeats", None)
         plain = isinstance(encoder, wgpu.GPUCommandEncoder | gpu.Gathering)
-        if not (plain and repeats is not None and repeats(inputs)):
-            self.method.encode(encoder, inputs, output)
-            return getattr(self.method, "finds", ())
 
         def record(tape: Any) -> None:
             self.method.encode(tape, inputs, output)
             tape.finds = getattr(self.method, "finds", ())
 
-        key, views = _tape_key(inputs)
-        return self._tapes.play(encoder, inputs.bindings, key, (*views, output), record).finds
+        if plain and repeats is not None and repeats(inputs):
+            key, views = _tape_key(inputs)
+            tape = self._tapes.play(encoder, inputs.bindings, key, (*views, output), record)
+            self._finds = tape.finds
+        else:
+            self.method.encode(encoder, inputs, output)
+            self._finds = getattr(self.method, "finds", ())
+        if confidence is not None and self.confidence:
+            self._judge.encode(encoder, inputs, confidence)
 
     def __call__(
         self, color: Floats | Frame, to_next: Floats | None = None, **passes: Unpack[PassKeywords]

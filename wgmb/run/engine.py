@@ -166,8 +166,14 @@ class _Run:
     def __call__(self) -> BatchReport:
         report = self._report
         try:
-            with gpu.reported():
-                self._flow()
+            with (
+                gpu.reported(),
+                closing(_read_ahead(self._input, self._is_done, self._is_over)) as read,
+                Behind(self._put, max(1, self._input.ahead), "write") as put,
+            ):
+                for frame in self._input.blur(_until(self._is_over, read)):
+                    put(frame)
+                    del frame
             if self._stop.is_set() and not report.stopped and report.rest:
                 report.stopped = ON_REQUEST
             self._end()
@@ -175,15 +181,6 @@ class _Run:
             self._sink.abandon()
             raise
         return report
-
-    def _flow(self) -> None:
-        with (
-            closing(_read_ahead(self._input, self._is_done, self._is_over)) as read,
-            Behind(self._put, max(1, self._input.ahead), "write") as put,
-        ):
-            for frame in self._input.blur(_until(self._is_over, read)):
-                put(frame)
-                del frame
 
     def _is_over(self) -> bool:
         return bool(self._report.stopped) or self._stop.is_set()

@@ -54,7 +54,8 @@ def blur_into(output: Output, stages: Stages, options: RunOptions) -> BatchRepor
     Numbers are those of the output's frames; conversion.py has the inputs of each at another rate.
     """
     _check_names(stages.clip, output)
-    report = _run(output, stages, options)
+    report = run_into(output, stages, stages.numbers, options, stages.made_of)
+    _describe(report, stages)
     if isinstance(stages, RateConversionStages):
         report.beyond = beyond(output.pattern, stages.numbers[-1])
     return report
@@ -80,13 +81,11 @@ def _check_names_of_views(clip: Clip, output: Output) -> None:
         )
 
 
-def _run(output: Output, stages: Stages, options: RunOptions) -> BatchReport:
-    """All frames into an output, with observations about them."""
-    report = run_into(output, stages, stages.numbers, options, stages.made_of)
+def _describe(report: BatchReport, stages: Stages) -> None:
+    """Add observations about the frames."""
     describe_input(report, stages.clip)
     is_converted = isinstance(stages, RateConversionStages)
     describe_frames(report, stages.clip, is_converted=is_converted)
-    return report
 
 
 def vectors_sequence(
@@ -105,4 +104,7 @@ def vectors_sequence(
     `blur_sequence`. `blur`: its device is used, and its `max_blur` limits the motion.
     """
     stages = MotionStages(clip, blur or Blur("tap"), all_views=output.takes_views)
-    return _run(output, stages, RunOptions(resume, progress, stop, on_error="go on"))
+    options = RunOptions(resume, progress, stop, on_error="go on")
+    report = run_into(output, stages, stages.numbers, options, stages.made_of)
+    _describe(report, stages)
+    return report

@@ -74,7 +74,9 @@ class VideoFrames:
         """
         number = self.shots[index].number
         if self._is_still(index):
-            return FrameInShot(FrameViews(color=self._light_view(index)), number=number)
+            return FrameInShot(
+                FrameViews(color=self._images.view_of(self._light(index))), number=number
+            )
         before = after = None
         method = (blur or self._blur).method
         takes = method.needs | method.uses
@@ -150,7 +152,7 @@ class VideoFrames:
         """The views of one picture. `depth`: whether it is wanted, if it is found only then."""
         picture, place = self.shots[index], self._place(index)
         of, kept = self._frames.get(place, (picture, None))
-        light = self._light_view(index)
+        light = self._images.view_of(self._light(index))
         if kept is None or of is not picture or kept.color.texture is not light.texture:
             kept = self._moving(index, light)
         if depth and kept.depth is None and kept.motion is not None and self._source is not None:
@@ -195,10 +197,6 @@ class VideoFrames:
         if not known:
             self._planes.draw(coded, texture)
         return texture
-
-    def _light_view(self, index: int) -> View:
-        """The same as a view."""
-        return self._images.view_of(self._light(index))
 
     def _held_out(self, index: int, plane: np.ndarray | None) -> View | None:
         """View of the mask of the areas of a picture that stay sharp."""
