@@ -197,6 +197,23 @@ def test_masks_begun_ahead_are_the_same_and_made_in_another_thread(clip, monkeyp
     assert [n for n, name in made if name == "displays"] == list(range(2, COUNT))
 
 
+def test_greys_are_made_where_the_mask_is(clip):
+    shown, made = list(enumerate(clip[0])), {}
+
+    def noted(picture):
+        made[picture[0]] = threading.current_thread().name
+        return grey(picture[1])
+
+    ahead = Displays(shown.__getitem__, lambda _, n: 0 <= n < len(shown), ahead=True, grey=noted)
+    for n in range(4):
+        ahead.mask(n)
+    here = threading.current_thread().name
+    reach = displays.REACH
+    assert {n: name for n, name in made.items() if n <= 3 + reach} == {
+        n: here if n <= 1 + reach else "displays" for n in range(4 + reach)
+    }
+
+
 def test_sums_and_contrast_are_those_of_loops():
     plane = np.random.default_rng(1).integers(0, 256, (19, 23)).astype(np.uint8)
     contrast = displays._contrast(plane)

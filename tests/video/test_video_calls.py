@@ -57,7 +57,7 @@ def test_a_picture_asks_for_no_more(device, as_with_a_gpu, flow):
 
 @pytest.mark.full
 def test_nothing_is_made_once_all_numbers_of_frames_were_there(device, as_with_a_gpu):
-    """There are 64 of them (NOISES of common/noise.wgsl), each with a buffer and groups of its own."""
+    """There are 64 (NOISES of common/noise.wgsl), each with a buffer and groups of its own."""
     for counts in calls(device, "auto", 64 + 2 * TURN + 8, (48, 32))[64 + 2 * TURN : -2]:
         made = {kind: counts.get(kind, 0) for kind in ("groups", "buffers", "textures", "views")}
         assert not any(made.values()), counts

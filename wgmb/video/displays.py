@@ -12,6 +12,7 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import takewhile
+from typing import Any
 
 import numpy as np
 
@@ -57,22 +58,23 @@ class _Picture:
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """The greys of a picture and of those around that have a say in its mask, by their numbers."""
+    """A picture and those around that have a say in its mask, by their numbers, as loaded."""
 
     number: int
-    greys: dict[int, np.ndarray]
+    loaded: dict[int, Any]
 
     def is_same(self, other: _Window) -> bool:
         """True if the mask is the same."""
-        return (self.number, [*self.greys]) == (other.number, [*other.greys]) and all(
-            grey is other.greys[n] for n, grey in self.greys.items()
+        return (self.number, [*self.loaded]) == (other.number, [*other.loaded]) and all(
+            picture is other.loaded[n] for n, picture in self.loaded.items()
         )
 
 
 class Displays:
     """Displays in pictures, one after the other.
 
-    `load(number)`: a picture (height, width) uint8, its display values without colour.
+    `load(number)`: a picture, whose display values without colour, (height, width) uint8, are
+    `grey` of it.
     `leads(number, other)`: whether motion leads from a picture to another, which is there then.
     `always`: also where their share of the picture, or a standing camera, speaks against a display.
     `ahead`: once a picture follows another, the mask of the next one is begun in a thread beside.
@@ -80,15 +82,17 @@ class Displays:
 
     def __init__(
         self,
-        load: Callable[[int], np.ndarray],
+        load: Callable[[int], Any],
         leads: Callable[[int, int], bool],
         always: bool = False,
         ahead: bool = False,
+        grey: Callable[[Any], np.ndarray] = lambda picture: picture,
     ):
         self._load, self._leads, self._always, self._ahead = load, leads, always, ahead
+        self._grey = grey
         self._pictures: dict[int, _Picture] = {}
         self._steps: dict[int, np.ndarray] = {}
-        self._greys: dict[int, np.ndarray] = {}
+        self._loaded: dict[int, Any] = {}
         self._last: int | None = None
         self._begun: tuple[_Window, Callable[[], np.ndarray | None]] | None = None
 
@@ -119,11 +123,11 @@ class Displays:
 
     def _searched(self, window: _Window) -> np.ndarray | None:
         """The mask of the picture in the middle; by one thread at a time."""
-        number, self._greys = window.number, window.greys
+        number, self._loaded = window.number, window.loaded
         self._forget(number)
         here = self._picture(number)
-        back = self._steps_between(range(min(window.greys), number))[::-1]
-        ahead = self._steps_between(range(number, max(window.greys)))
+        back = self._steps_between(range(min(window.loaded), number))[::-1]
+        ahead = self._steps_between(range(number, max(window.loaded)))
         if len(back) + len(ahead) < _STILL:
             return None
         count, often = self._standing(number, back, ahead)
@@ -165,7 +169,7 @@ class Displays:
 
     def _picture(self, number: int) -> _Picture:
         if number not in self._pictures:
-            self._pictures[number] = _Picture.of(self._greys[number])
+            self._pictures[number] = _Picture.of(self._grey(self._loaded[number]))
         return self._pictures[number]
 
     def _steps_between(self, numbers: range) -> list[np.ndarray]:

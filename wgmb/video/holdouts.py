@@ -42,7 +42,11 @@ class Holdout:
     def of(self, shots: Shots[Thumbnail], ahead: bool = False) -> Held:
         """Masks of pictures, by their indices. `ahead`: see Displays."""
         found = Displays(
-            lambda index: shots[index].content.grey, shots.moves_on, self.always, ahead
+            lambda index: shots[index].content,
+            shots.moves_on,
+            self.always,
+            ahead,
+            grey=lambda thumbnail: thumbnail.grey,
         )
 
         def held(index: int) -> np.ndarray | None:
