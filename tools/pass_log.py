@@ -43,7 +43,7 @@ RUNS |= {
     "confidence": "blur sample -o r.#.exr --frames 10 --method gather --confidence --reach 2",
     "shadows": "blur sample -o r.#.exr --frames 10 --method gather --shading frames",
     "edges": "blur sample -o r.#.exr --frames 10 --method gather --where edges --max-blur 12",
-    "mask": "blur sample -o r.#.exr --frames 10 --method fusion --keep ViewLayer.IndexOB=1",
+    "mask": "blur sample -o r.#.exr --frames 10 --method fusion --holdout ViewLayer.IndexOB=1",
     "lit": "render crossing -o lit.#.exr --sharp --passes --frames 0-2 --size 96x54",
     "passes": "blur lit.#.exr -o r.#.exr --frames 1 --method gather",
     "video": "blur clip8.mp4 -o r.mp4 --end 0.25",

@@ -38,7 +38,7 @@ SHOTS = [
     "blur sample -o o.#.png --bits 16 -v", "blur sample -o o.mp4 --fps 2", "blur sample -o o.gif",
     "blur sample -o o.#.exr --layers picture --compression piz --window keep",
     "blur sample -o o.#.exr --confidence", "blur sample -o o.#.exr --resume",
-    "blur sample -o o.#.exr --frames 10 --keep Nothing", "blur sample -o o.#.exr --frames 1-3",
+    "blur sample -o o.#.exr --frames 10 --holdout Nothing", "blur sample -o o.#.exr --frames 1-3",
     "blur sample -o o.#.png --ocio builtin", "blur sample -o o.#.exr --fps-in 24 --fps 12",
     "blur sample -o o.#.exr --vectors none --flow dis", "blur sample -o o.#.exr --cuts only:10",
     "blur stereo/s.####.exr -o o.#.exr", "blur stereo/s.####.exr -o %V.#.exr --view left",
@@ -56,7 +56,8 @@ VIDEOS = [
     "blur clip8.mp4 -o o.#.exr --begin 0.1 --end 0.4", "blur clip8.mp4 -o o.gif --fps 5",
     "blur clip8.mp4 -o o.mov --codec prores --highlights 4 --cuts 6", "blur clip8.mp4 -o x/o.txt",
     "blur clip8.mp4 clip10.mkv -o out/ --fps 30", "blur clip8.mp4 -o o.mp4 --resume",
-    "blur clip8.mp4 -o o.mkv --keep static", "blur clip8.mp4 -o o.mp4 --cuts none --pitch follow",
+    "blur clip8.mp4 -o o.mkv --holdout static",
+    "blur clip8.mp4 -o o.mp4 --cuts none --pitch follow",
 ]  # fmt: skip
 SCENES = [
     "render crossing -o r.#.exr --frames 3-5 --size 96x54 --passes",

@@ -141,9 +141,9 @@ def test_an_option_without_a_use_is_refused(inputs, capsys):
 
 
 UNREADABLE = [
-    (("--keep", "away.png"), "away.png: no such file"),
-    (("--keep", "away.txt"), "--holdout of a video must be"),
-    (("--keep", "small.png"), "small.png must be"),
+    (("--holdout", "away.png"), "away.png: no such file"),
+    (("--holdout", "away.txt"), "--holdout of a video must be"),
+    (("--holdout", "small.png"), "small.png must be"),
     (("--cuts", "away.edl"), "away.edl: no such file"),
     (("--curve", "away.csv"), "away.csv"),
 ]

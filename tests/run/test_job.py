@@ -134,7 +134,9 @@ def test_masks_layers_from_beside_cameras_and_curves_are_found_from_anywhere(des
         "002 A V C 00:00:00:00 00:00:00:03 00:00:00:03 00:00:00:06\n"
     )
     words = "--camera in/cam.json --also in/also.exr --curve in/c.csv --cuts only:in/cut.edl@24 "
-    words += "--holdout IndexOB=4 --keep in/m.####.exr --scale in/half.png:0.5 --scale IndexOB=4:0"
+    words += (
+        "--holdout IndexOB=4 --holdout in/m.####.exr --scale in/half.png:0.5 --scale IndexOB=4:0"
+    )
     whole, _ = check(capsys, "in/c.####.exr", ["1-2", "3-5", "6"], *words.split())
     assert "camera cut before frame 4" in whole
 
@@ -207,7 +209,9 @@ def test_a_mask_that_other_parts_have_is_no_fault_of_this_part(desk, capsys):
     for n in range(1, 5):
         index = np.full((48, 64), 4.0 if n == 4 else 1.0, np.float32)
         make.write_exr(desk / "in" / f"s.{n:04d}.exr", make.frame(n) | {"IndexOB.X": index})
-    _, told = check(capsys, "in/s.####.exr", ["1-3", "4"], "--keep", "IndexOB=4", "--method", "tap")
+    _, told = check(
+        capsys, "in/s.####.exr", ["1-3", "4"], "--holdout", "IndexOB=4", "--method", "tap"
+    )
     assert told.count("IndexOB=4 is in no pixel of these frames") == 1
 
 

@@ -108,7 +108,7 @@ def test_layers_of_parts_are_found_by_the_options_that_name_them(tmp_path, capsy
     parts = [make.part(dict(list(channels.items())[i:j]), name=name)
              for name, i, j in (("rgba", 0, 4), ("far", 4, 5), ("mv", 5, 7))]  # fmt: skip
     path = make.write_parts(tmp_path / "a.exr", [*parts, make.part(masks, name="matte")])
-    options = "--layer", "rgba", "--depth", "far", "--vectors", "nuke", "--keep", "matte"
+    options = "--layer", "rgba", "--depth", "far", "--vectors", "nuke", "--holdout", "matte"
     for name in ("forward", "mv.forward"):
         out = tmp_path / "o.exr"
         more = "--vector-layer", name, "--overwrite"

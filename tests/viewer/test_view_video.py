@@ -540,7 +540,7 @@ def test_the_speed_of_the_output_is_saved_and_played(clip):
     ("changes", "said"),
     [
         (["wheel", "--speed", "0.5"], "--speed is for videos"),
-        (["wheel", "--keep", "static"], "--holdout is for frames and videos"),
+        (["wheel", "--holdout", "static"], "--holdout is for frames and videos"),
         (["CLIP", "--speed", "0"], "--speed must be 0.01 to 100"),
     ],
 )

@@ -79,7 +79,6 @@ class BlurOptions(BlurSettings):
     holdout: Annotated[
         tuple[str, ...],
         Parameter(
-            alias="--keep",
             help="Pixels that stay sharp: LAYER (grey), LAYER=VALUE (object index, Cryptomatte; "
             "names may have wildcards), an image file; for videos also static, or none, as "
             "displays are found; may be repeated.",
