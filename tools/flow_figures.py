@@ -2,9 +2,9 @@
 
 Prints a table of the searches of docs/engineers/flow.md: for every motion, the mean error in
 pixels, over all pixels and over those that the other frame still shows, and FLIP of the picture
-that `gather` blurs with it at 180 degrees; `Flow()`, `Flow(quality="fast")` and OpenCV's DIS at full size. Pictures are
-256 x 144, in 8 bits: noise that falls with frequency as a photograph's does, and discs of all sizes
-that hide one another. Takes some minutes.
+that `gather` blurs with it at 180 degrees; `Flow()`, `Flow(quality="fast")` and OpenCV's DIS at
+full size. Pictures are 256 x 144, in 8 bits: noise that falls with frequency as a photograph's
+does, and discs of all sizes that hide one another. Takes some minutes.
 """
 
 import sys
