@@ -44,6 +44,7 @@ from wgmb.viewer.draw.request import Request
 from wgmb.viewer.panel import overlay
 from wgmb.viewer.panel.panel import commands
 from wgmb.viewer.state.state import video_time
+from wgmb.viewer.subjects import motion_thread
 from wgmb.viewer.subjects.video import VideoSubject
 from wgmb.viewer.subjects.video_motion import MotionRequest, PictureFinder, PictureFinding
 from wgmb.viewer.window import frame
@@ -597,6 +598,22 @@ def test_motion_is_made_once_whatever_changes(clip, held):
     np.testing.assert_array_equal(settled(viewer), first)
     assert len(held.made) == before
     viewer.stage.choices.close()
+
+
+def test_as_many_motions_are_kept_as_there_is_memory_for_or_an_exposure_needs(clip, monkeypatch):
+    monkeypatch.setattr(motion_thread, "_MEMORY", 5 * SIZE[0] * SIZE[1] * 4 * 6)
+    flow, device = FlowSettings(flow="dis"), gpu.open_device()
+    thread = motion_thread.MotionThread(clip, 1000, flow, device, MotionRequest())
+    for wanted, needed, want in [(range(12), 2, 5), ((2, 3, 4, *range(5, 13)), 7, 7)]:
+        thread.want(tuple(wanted), needed)
+        for _ in range(400):
+            time.sleep(0.05)
+            if thread.making is None and all(thread.known(n) for n in wanted[:needed]):
+                break
+        time.sleep(0.3)  # in which it would go on
+        there = [n for n in range(14) if thread.known(n) is not None]
+        assert len(there) == want and set(wanted[:needed]) <= {*there}
+    thread.close()
 
 
 def test_it_plays_at_its_own_rate_and_steps_from_picture_to_picture(clip):
