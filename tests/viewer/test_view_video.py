@@ -601,7 +601,7 @@ def test_motion_is_made_once_whatever_changes(clip, held):
 
 
 def test_as_many_motions_are_kept_as_there_is_memory_for_or_an_exposure_needs(clip, monkeypatch):
-    monkeypatch.setattr(motion_thread, "_MEMORY", 5 * SIZE[0] * SIZE[1] * 4 * 6)
+    monkeypatch.setattr(motion_thread, "_MEMORY", 5 * SIZE[0] * SIZE[1] * 20)
     flow, device = FlowSettings(flow="dis"), gpu.open_device()
     thread = motion_thread.MotionThread(clip, 1000, flow, device, MotionRequest())
     for wanted, needed, want in [(range(12), 2, 5), ((2, 3, 4, *range(5, 13)), 7, 7)]:
