@@ -97,8 +97,18 @@ def ball():
     return Scene("ball", (*_room(), body), _before_the_wall())
 
 
-def _before_the_wall():
-    return CameraPath(lambda t: (0 * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
+def passed_barrel():
+    """The same barrel before a camera that moves aside: its outline moves, but not as its surface
+    does."""
+    return Scene("passed_barrel", barrel().bodies, _before_the_wall(2.0))
+
+
+def passed_ball():
+    return Scene("passed_ball", ball().bodies, _before_the_wall(2.0))
+
+
+def _before_the_wall(speed=0.0):
+    return CameraPath(lambda t: (speed * t, 1.4, 2.6), pitch=lambda t: -0.04 + 0 * t)
 
 
 def _turning(x, y, z, turn, lean):
@@ -111,7 +121,7 @@ def _turning(x, y, z, turn, lean):
     )
 
 
-TURNING = (barrel, ball)
+TURNING = (barrel, ball, passed_barrel, passed_ball)
 SCENES = {scene.__name__: scene for scene in (shaken, foliage, beginner, wires, *TURNING)}
 
 

@@ -34,6 +34,9 @@ const BACK: u32 = 1u;
 const FULL: f32 = 0.98;         // coverage from which on it is taken for 1, and below 1 less it for 0
 const MOST_CONTRAST: f32 = 1.2; // of a front layer to the brightest pixel of it around,
 const WIRE_CONTRAST: f32 = 2.0; // which may be half background in a wire
+const LINES: f32 = 5.0;         // of a mask of 5 x 5 pixels, across an outline
+const MASK_ERROR: f32 = 1.0;    // of the way of an outline between two masks [px]: in each, it lies half a pixel off at most
+const OUTLINE_STEPS: i32 = 6;   // in which an outline is approached, by at most half a mask each
 
 /// Those of a pixel and of the ones to its left and right together.
 fn three_flags(px: vec2i) -> u32 {
@@ -103,8 +106,10 @@ fn separate_layers(@builtin(local_invocation_index) local: u32, @builtin(workgro
     if sides.front.total > 0.0 && sides.back.total > 0.0 && sides.back.weight > 0.0 {
         let axis = sides.front_motion - sides.back_motion;
         if dot(axis, axis) >= EDGE_MOTION * EDGE_MOTION && is_mixture(edge.motion - sides.back_motion, axis) {
-            if outline_rests(edge, around, sides) { // the pixel shows the same of both all the time
-                split.front_motion = sides.back_motion;
+            var outline = Outline(sides.back_motion, outline_rests(edge, around, sides));
+            if !outline.is_found { outline = outline_of_turning(edge, around, sides); }
+            if outline.is_found { // the pixel shows the same of both all the time
+                split.front_motion = outline.steps;
                 split.front_at = around.back_place.at;
                 split.front_z = sides.front.depth / sides.front.total;
             } else {
@@ -162,6 +167,96 @@ fn outline_changes(edge: EdgePixel, vectors: vec4f) -> u32 {
         changes += select(0u, neighbours.has_next, (after < edge.between) != is_front);
     }
     return changes;
+}
+
+struct Outline {        // of the front around an edge pixel, in the frames around
+    steps: vec4f,       // the way to it there, as vectors are [px]
+    is_found: bool,     // all lines across it are the same there to within a pixel
+}
+
+struct Mask {           // of the 5 x 5 around an edge pixel
+    axis: vec2i,        // across the outline, to the front: along x or y
+    front: i32,         // pixels in front
+}
+
+/// The same of an outline that moves, as under a camera that does: the surface moves under it, by more than masks of pixels can err,
+/// and it moves slower than that against the background. The way to it is found from the background's motion, and
+/// again from the front's, each across the outline: where spokes take each other's places, the two lead to different ones.
+fn outline_of_turning(edge: EdgePixel, around: Around, sides: Sides) -> Outline {
+    let none = Outline(vec4f(0.0), false);
+    if sides.thin { return none; }
+    let mask = front_mask(edge);
+    let led = outline_from(edge, mask, sides.front_motion);
+    let off = both_ways(led.steps - sides.front_motion);
+    if !led.is_found || length(off) <= MASK_ERROR { return none; }
+    let across = abs(vec4f(vec4i(mask.axis, mask.axis)));
+    let outline = outline_from(edge, mask, sides.back_motion);
+    let again = outline_from(edge, mask, mix(sides.back_motion, sides.front_motion, across));
+    let apart = again.steps - outline.steps;
+    let is_same = outline.is_found && again.is_found && max(length(apart.xy), length(apart.zw)) <= MASK_ERROR;
+    let drift = outline.steps - sides.back_motion;
+    let bends = length(drift.xy + drift.zw) > MASK_ERROR;
+    let drifts = length(both_ways(drift));
+    let turns = drifts < length(both_ways(outline.steps - sides.front_motion));
+    let deep = inside(around.front_place.at + 2 * mask.axis);
+    let change = both_ways(textureLoad(motion, deep, 0) - textureLoad(motion, around.front_place.at, 0));
+    let turns_within = flagged_depth(flags_at(deep)) >= edge.between || dot(change, off) < 0.0;
+    let is_outline = is_same && turns && !bends && (turns_within || drifts <= 2.0 * MASK_ERROR);
+    return Outline(outline.steps, is_outline);
+}
+
+/// What vectors lead to between the frame before and the one after.
+fn both_ways(vectors: vec4f) -> vec2f {
+    return vectors.zw - vectors.xy;
+}
+
+fn front_mask(edge: EdgePixel) -> Mask {
+    var inward = vec2i(0);
+    var front = 0;
+    for (var i = 0; i < 25; i++) {
+        let off = vec2i(i % 5, i / 5) - 2;
+        let is_front = i32(flagged_depth(flags_at(edge.px + off)) < edge.between);
+        inward += is_front * sign(off);
+        front += is_front;
+    }
+    let axis = select(vec2i(0, sign(inward.y)), vec2i(sign(inward.x), 0), abs(inward.x) >= abs(inward.y));
+    return Mask(axis, front);
+}
+
+/// The outline in the frames around, nearest to where these vectors lead.
+fn outline_from(edge: EdgePixel, mask: Mask, vectors: vec4f) -> Outline {
+    var outline = Outline(vectors, true);
+    if neighbours.has_prev == 1u {
+        let there = outline_in(edge, mask, vectors.xy, false);
+        outline = Outline(vec4f(there.xy, outline.steps.zw), there.z <= LINES);
+    }
+    if neighbours.has_next == 1u {
+        let there = outline_in(edge, mask, vectors.zw, true);
+        outline = Outline(vec4f(outline.steps.xy, there.xy), outline.is_found && there.z <= LINES);
+    }
+    return outline;
+}
+
+/// The step to it in one frame, and how many pixels of the 5 x 5 are on another side there. A pixel more in front in each of the five
+/// lines across is a pixel of the way.
+fn outline_in(edge: EdgePixel, mask: Mask, vectors: vec2f, is_next: bool) -> vec3f {
+    var step = vec2i(round(vectors));
+    var rest = 0.0;
+    var changes = 0.0;
+    for (var k = 0; k < OUTLINE_STEPS; k++) {
+        step += i32(round(rest)) * mask.axis;
+        var front = 0;
+        changes = 0.0;
+        for (var i = 0; i < 25; i++) {
+            let px = edge.px + vec2i(i % 5, i / 5) - 2;
+            let is_front = valid_depth(depth_there(inside(px + step), is_next)) < edge.between;
+            front += i32(is_front);
+            changes += f32(is_front != (flagged_depth(flags_at(px)) < edge.between));
+        }
+        rest = f32(mask.front - front) / LINES;
+        if abs(rest) <= 0.5 { break; }
+    }
+    return vec3f(vec2f(step) + rest * vec2f(mask.axis), changes);
 }
 
 /// The two layers of a pixel whose motion is between those of the two sides, along `axis`.
