@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from hatchling.builders.sdist import SdistBuilder
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -86,6 +87,15 @@ def test_the_supported_pythons_are_those_of_the_workflow():
     tried = re.search(r"python: \[(.*)\]", text)[1].replace('"', "").split(", ")
     said = [c.rpartition(" ")[2] for c in PROJECT["project"]["classifiers"] if ":: 3." in c]
     assert tried == said
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone: an unpacked archive")
+def test_the_source_archive_holds_every_file_of_the_repository():
+    """`run` was missing from it, so that no command of README worked in an unpacked archive."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
+    tracked = {name for name in listed.stdout.decode().split("\0") if (ROOT / name).is_file()}
+    packed = {file.relative_path for file in SdistBuilder(str(ROOT)).recurse_included_files()}
+    assert "run" in tracked and tracked - packed == set()
 
 
 WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
