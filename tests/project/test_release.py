@@ -89,6 +89,24 @@ def test_the_supported_pythons_are_those_of_the_workflow():
     assert tried == said
 
 
+VERSIONED = {
+    "wgmb/_version.py": r'^__version__ = "(.+)"$',
+    "pyproject.toml": r'^version = "(.+)"$',
+    "CITATION.cff": r"^version: (.+)$",
+    "blender/wgmb_blender/blender_manifest.toml": r'^version = "(.+)"$',
+    "comfyui/pyproject.toml": r'^version = "(.+)"$|\[video\] == (.+)"\]$',
+}
+
+
+@pytest.mark.parametrize("path", VERSIONED)
+def test_the_version_is_the_same_in_every_file_that_the_page_names(path):
+    found = re.findall(VERSIONED[path], (ROOT / path).read_text("utf-8"), re.M)
+    assert found and {"".join(one) for one in found} == {__version__}
+    page = (ROOT / "docs/development/contributing.md").read_text("utf-8")
+    step = page.partition("1. Set the version in ")[2].partition("\n2. ")[0]
+    assert f"`{path}`" in step
+
+
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="no clone: an unpacked archive")
 def test_the_source_archive_holds_every_file_of_the_repository():
     """`run` was missing from it, so that no command of README worked in an unpacked archive."""
