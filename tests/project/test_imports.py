@@ -3,6 +3,7 @@
 import ast
 import re
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -242,3 +243,13 @@ def test_no_two_public_classes_have_one_name():
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found.setdefault(node.name, []).append(str(file.relative_to(PACKAGE)))
     assert not {name: files for name, files in found.items() if len(files) > 1}
+
+
+def test_no_two_modules_of_the_tests_have_one_name():
+    """pytest imports each by its name alone; of two, it refuses the second, and the whole run."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["pytest"]
+    places = [ROOT / place for place in settings["ini_options"]["pythonpath"]]
+    files = {file for place in places for file in place.glob("*.py")}
+    files |= set((ROOT / "tests").rglob("test_*.py"))
+    names = Counter(file.stem for file in files if not (file.parent / "__init__.py").exists())
+    assert len(names) > 200 and [name for name, count in names.items() if count > 1] == []
