@@ -16,7 +16,9 @@ import cv2
 from wgmb.flow.dis import Dis
 from wgmb.flow.dis.blocks import searched
 from wgmb.flow.dis.by_place import ByPlace
+from wgmb.methods.gather.tiles.active_tiles import ActiveTiles
 from wgmb.video import gpu_frames
+from wgmb.video.edges import MotionEdges
 
 WIDTH, HEIGHT, COUNT = 320, 180, 5
 
@@ -223,6 +225,49 @@ def test_pictures_without_edges_of_motion_are_tapped(device):
     tapped = wgmb.blur_pictures(pictures, device=device, method="tap")
     for one, two in zip(auto, tapped, strict=True):
         np.testing.assert_array_equal(one, two)
+
+
+@pytest.fixture
+def lists(device, monkeypatch):
+    """`lists(motion, blur)`: True if gather lists a tile of a picture that moves like that."""
+    active, original = [], ActiveTiles.encode
+
+    def encode(self, encoder, inputs):
+        found = original(self, encoder, inputs)
+        active[:] = [found["active"]]
+        return found
+
+    def of(motion, blur):
+        color, depth = np.ones((*motion.shape[:2], 3), "f4"), np.ones(motion.shape[:2], "f4")
+        blur(wgmb.Frame(color, motion=motion, depth=depth))
+        words = device.queue.read_buffer(*active[0].values())
+        return bool(np.frombuffer(words, "u4")[3])
+
+    monkeypatch.setattr(ActiveTiles, "encode", encode)
+    return of
+
+
+@pytest.mark.parametrize(
+    ("shutter", "factors"),
+    [
+        (wgmb.Shutter(180), (1, 1)),
+        (wgmb.Shutter(300, phase="start"), (0.5, 2)),
+        (wgmb.Shutter(90, rolling="down"), (1, 1)),
+    ],
+)
+def test_gather_runs_only_where_it_lists_a_tile(device, lists, shutter, factors):
+    """One pixel, or a border, moves otherwise by a vector back, ahead or both, near the limit."""
+    options = {"shading": "off", "where": "edges", "samples": 2}
+    blur, answers = wgmb.Blur("gather", device=device, shutter=shutter, **options), set()
+    for where in (np.s_[18:19, 34:35], np.s_[:, 15:], np.s_[41:, :]):
+        for sides in (np.s_[:2], np.s_[2:], np.s_[:]):
+            for step in (6, 15, 17, 30):
+                motion = np.zeros((50, 70, 4), "f4")
+                motion[where][..., sides] += step
+                runs = MotionEdges(motion).within(shutter, factors)
+                assert runs == lists(motion * np.repeat(np.float32(factors), 2), blur)
+                answers.add(runs)
+    assert answers == {True, False}
 
 
 def test_pictures_that_stand_are_copied_and_not_searched(device, monkeypatch):

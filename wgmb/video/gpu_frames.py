@@ -9,7 +9,6 @@ import wgpu
 
 from .. import gpu
 from ..exposure import Cell, evened
-from ..gpu import wgsl
 from ..gpu.textures import KeptViews, TexturePool
 from ..gpu_frame.views import TEXTURES, FrameInShot, FrameViews, View
 from ..pipeline.blur import Blur
@@ -23,7 +22,6 @@ from .planes import Planes
 from .ragged import KEPT
 from .thumbnail import Thumbnail, is_same
 
-EDGE = float(wgsl.load("methods/gather/tiles/active_tiles.wgsl").constant("EDGE"))  # px
 LIGHTS = 6  # pictures kept as light: a frame and its neighbours, the next one, and two of a sum
 
 
@@ -115,9 +113,8 @@ class VideoFrames:
         """True if the motion of a picture has edges within its exposure, as gather looks for."""
         if self._source is None or self._is_still(cell.index):
             return False
-        times = cell.shutter.span
-        longest = max(abs(time) for time in times) * max(self._factors(cell.index))
-        return longest * self._source.change(cell.index) > EDGE
+        edges = self._source.edges(cell.index)
+        return edges is None or edges.within(cell.shutter, self._factors(cell.index))
 
     def _is_still(self, index: int) -> bool:
         """True if motion leads to pictures beside one, and all of them are the same."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
+import numpy as np
 import wgpu
 
 from ..flow import Flow, Shot
@@ -15,6 +15,7 @@ from ..flow.dis.by_place import PlaceShot
 from ..gpu.textures import TexturePool
 from ..shots.motion import Found, MotionSource, ShotMotion
 from ..shots.reader import Shots
+from .edges import MotionEdges
 from .planes import Planes
 from .ragged import KEPT, RaggedMotion
 from .thumbnail import Thumbnail
@@ -38,8 +39,8 @@ class MotionTextures(Protocol):
         """The depth of a picture whose motion was given without; None where there is none."""
         ...
 
-    def change(self, index: int) -> float:
-        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+    def edges(self, index: int) -> MotionEdges | None:
+        """Edges of a picture's motion, None if they are not known."""
         ...
 
     def is_unfollowed(self, index: int, held: Any) -> bool:
@@ -112,10 +113,13 @@ class VideoMotion(ShotMotion):
         motion, depth = textures
         return self._down(motion), None if depth is None else self._down(depth)[..., 0]
 
-    def change(self, index: int) -> float:
-        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+    def edges(self, index: int) -> MotionEdges | None:
+        """Edges of a picture's motion, None if they are not known."""
         shot = self.shot(index)
-        return shot.change(index) if isinstance(shot, PlaceShot) else math.inf
+        if not isinstance(shot, PlaceShot):
+            return None
+        motion = shot.motion(index)
+        return MotionEdges(np.zeros((1, 1, 4), np.float32) if motion is None else motion)
 
     def is_unfollowed(self, index: int, held: Any) -> bool:
         """Return True if a place of a picture was not followed (see unfollowed.py).

@@ -79,10 +79,10 @@ class ByPlace:
 
 def uneven(motion: np.ndarray, least: float) -> np.ndarray:
     """(rows, columns) bool: tiles in which motion (height, width, 4) changes by over `least` px."""
-    return _changes(motion) > least
+    return changes(motion) > least
 
 
-def _changes(motion: np.ndarray) -> np.ndarray:
+def changes(motion: np.ndarray) -> np.ndarray:
     """(rows, columns) by how much the motion changes in each tile and beside it [px]."""
     thin, side = motion[THIN // 2 :: THIN, THIN // 2 :: THIN], TILE // THIN
     if not thin.size:
@@ -127,8 +127,3 @@ def _joined(boxes: list[tuple[int, ...]]) -> Iterator[tuple[int, int, tuple[int,
 
 class PlaceShot(DisShot):
     """Motion of the pictures of a shot by a ByPlace; made by `ByPlace.shot`."""
-
-    def change(self, number: int) -> float:
-        """The greatest change of a picture's motion within a tile [px per frame interval]."""
-        motion = self.motion(number)
-        return 0.0 if motion is None else float(_changes(motion).max())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ from ...gpu.textures import TexturePool
 from ...shots.reader import Picture, Shots
 from ...shutter import Shutter
 from ...video.clock import Clock
+from ...video.edges import MotionEdges
 from ...video.holdouts import Holdout
 from ...video.linear_frames import CodedPictures
 from ...video.output_times import OutputFrame
@@ -244,10 +244,10 @@ class KnownMotion:
     def depth(self, index: int) -> None:
         """None: it is given with the motion."""
 
-    def change(self, index: int) -> float:
-        """The greatest change of a picture's motion within a tile [px], infinite if not known."""
+    def edges(self, index: int) -> MotionEdges | None:
+        """Edges of a picture's motion, None if they are not known."""
         finding = self._known(index)
-        return math.inf if finding is None else finding.change
+        return None if finding is None else finding.edges
 
     def is_unfollowed(self, index: int, held: object) -> bool:
         """False: the viewer has no report."""

@@ -6,7 +6,6 @@ those that cannot be decoded mean the same. Any picture may be asked for; neighb
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -17,6 +16,7 @@ import wgpu
 from ...shots.cut_list import CutList
 from ...shots.motion import MotionSource, window
 from ...shots.reader import NoPicturesError, Picture, ShotReader
+from ...video.edges import MotionEdges
 from ...video.exposures import BEFORE
 from ...video.holdouts import NONE, Held, holdout_of
 from ...video.motion import VideoMotion
@@ -47,8 +47,8 @@ class PictureFinding:
     """It repeats the picture before, or cannot be decoded: those beside it reach over its time."""
     holdout: np.ndarray | None = None
     """(height, width): 1 stays sharp; of pictures with motion."""
-    change: float = math.inf
-    """The greatest change of the motion within a tile [px], infinite if not known."""
+    edges: MotionEdges | None = None
+    """Those of the motion, None if they are not known."""
     time: float | None = None
     """The time that a cadence gives it, on the video's clock [s]; None: that in the file."""
 
@@ -119,7 +119,7 @@ class PictureFinder:
             begins_shot=not shots.same_shot(here, here - 1),
             ends_shot=not shots.same_shot(here, here + 1),
             holdout=None if found is None or not self._held else self._held(here),
-            change=math.inf if found is None or not self._motion else self._motion.change(here),
+            edges=None if found is None or not self._motion else self._motion.edges(here),
             time=None if time == self._times[number] else time,
         )
 
