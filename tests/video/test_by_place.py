@@ -14,7 +14,7 @@ pytest.importorskip("cv2")
 import cv2
 
 from wgmb.flow.dis import Dis
-from wgmb.flow.dis.blocks import searched
+from wgmb.flow.dis.blocks import MOST_OTHER, OTHER, SMALL, Reduced, searched
 from wgmb.flow.dis.by_place import ByPlace
 from wgmb.methods.gather.tiles.active_tiles import ActiveTiles
 from wgmb.video import gpu_frames
@@ -141,6 +141,21 @@ def test_no_body_is_found_in_a_dissolve(speeds):
         near = pictures[n - 1 : n + 2]
         found = searched(near, Dis("fast").motion(near))
         assert found is None or found.other.mean() < 0.03
+
+
+def test_a_way_along_which_a_place_is_the_mean_of_both_neighbours_costs_little():
+    """Its cost has the differences to the neighbours no longer; lost places have them still."""
+    prev, next = (np.rint(255 * texture(160, 90, 9, n)[..., 1].clip(0, 1)) for n in (1, 2))
+    pictures = [p.astype("u1") for p in (prev, np.rint((prev + next) / 2), next)]
+    none = np.zeros((90, 160, 4), np.float32)
+    level = Reduced(pictures, SMALL)
+    better, worse = level.differences(none)
+    assert better.mean() > 15
+    share = cv2.blur(OTHER * np.minimum(worse, MOST_OTHER), (3, 3))
+    assert np.abs(level.cost(none) - share).max() <= 0.5
+    for alone in ([None, *pictures[1:]], [*pictures[:2], None]):
+        level = Reduced(alone, SMALL)
+        np.testing.assert_allclose(level.cost(none), cv2.blur(level.differences(none)[0], (3, 3)))
 
 
 @pytest.mark.parametrize("kind", ["textured", "moving"])

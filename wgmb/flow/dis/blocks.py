@@ -86,17 +86,27 @@ class Reduced:
 
         That to the other is 0 if it lacks.
         """
-        sides = []
-        for side, other in self.sides.items():
-            apart = _cv().absdiff(self.moved(other, way_of(state, side)), self.here)
-            sides.append(_cv().blur(_cv().min(apart, MOST_APART), (3, 3)))
-        better = np.minimum.reduce(sides)
-        return better, np.maximum.reduce(sides) if len(sides) > 1 else np.zeros_like(better)
+        return _better_and_other([self._apart(plane) for plane in self._neighbours(state)])
 
     def cost(self, state: np.ndarray) -> np.ndarray:
-        """The differences of a state, in levels of 255, averaged over 3 x 3 pixels once more."""
-        better, worse = self.differences(state)
+        """The differences of a state, in levels of 255, averaged over 3 x 3 pixels once more.
+
+        The mean of both neighbours counts as a third one. In a dissolve it would fit almost any
+        way, but there no block is searched (`unfit`).
+        """
+        neighbours = self._neighbours(state)
+        better, worse = _better_and_other([self._apart(plane) for plane in neighbours])
+        if len(neighbours) > 1:
+            better = _cv().min(better, self._apart(_mean(neighbours)))
         return _cv().blur(better + OTHER * _cv().min(worse, MOST_OTHER), (3, 3))
+
+    def _neighbours(self, state: np.ndarray) -> list[np.ndarray]:
+        """The neighbours that there are, each at where the state leads."""
+        return [self.moved(other, way_of(state, side)) for side, other in self.sides.items()]
+
+    def _apart(self, plane: np.ndarray) -> np.ndarray:
+        """Differences of a plane from the picture, each at most `MOST_APART`, means of 3 x 3."""
+        return _cv().blur(_cv().min(_cv().absdiff(plane, self.here), MOST_APART), (3, 3))
 
     def softened(self) -> Reduced:
         """The same without the finest texture, in which errors of a part of a pixel show most."""
@@ -121,12 +131,21 @@ class Reduced:
 
     def _is_even(self, state: np.ndarray, unfit: np.ndarray) -> np.ndarray:
         """(height, width) bool: places around which some of the unfit fit the mean of both."""
-        prev, next = (self.moved(self.sides[side], way_of(state, side)) for side in (0, 1))
-        apart = _cv().min(_cv().absdiff((prev + next) / 2, self.here), MOST_APART)
-        even = unfit & (_cv().blur(apart, (3, 3)) <= UNFIT)
+        even = unfit & (self._apart(_mean(self._neighbours(state))) <= UNFIT)
         side = 2 * int(REGION) + 1
         evens, all = (_cv().blur(n.astype(np.float32), (side, side)) for n in (even, unfit))
         return evens > LEAST_EVEN * all
+
+
+def _better_and_other(apart: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The smaller and the larger of two planes of differences; a single one, and 0."""
+    one, two = apart[0], apart[-1]
+    return _cv().min(one, two), _cv().max(one, two) if len(apart) > 1 else np.zeros_like(one)
+
+
+def _mean(neighbours: list[np.ndarray]) -> np.ndarray:
+    """The mean of two neighbours."""
+    return _cv().addWeighted(neighbours[0], 0.5, neighbours[1], 0.5, 0)
 
 
 class Blocks(NamedTuple):
