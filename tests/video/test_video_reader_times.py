@@ -3,6 +3,7 @@
 import struct
 from array import array
 from fractions import Fraction
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -170,6 +171,8 @@ def test_packets_without_data_do_not_end_a_stream():
             self.size = size
 
     class Stream:
+        codec_context = SimpleNamespace(name="h264", extradata=None)
+
         def decode(self, packet):
             return [packet.size] if packet is not None else ["the end"]
 
