@@ -167,6 +167,8 @@ def test_packets_without_data_do_not_end_a_stream():
     """PMP has them for pictures that repeat the one before."""
 
     class Packet:
+        opaque = None
+
         def __init__(self, size):
             self.size = size
 
