@@ -122,7 +122,7 @@ def test_motion_that_is_searched_crosses_the_seam(tmp_path, shift):
         motion = clip.frame(clip.source(10)).motion
         off = np.abs(motion[..., ::2] - (-SPEED, SPEED)).max(axis=2)
         right.append(float((off[_picture(10, centre)[1]] < SPEED / 10).mean()))
-    assert right[1] > 0.99 * right[0] > 0.95 and right[2] < 0.7, right
+    assert right[1] > 0.99 * right[0] > 0.95 and right[2] < 0.9, right
 
 
 @pytest.mark.fast

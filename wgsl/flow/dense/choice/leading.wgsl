@@ -19,7 +19,7 @@ fn place_of(px: vec2i, way: vec2f) -> u32 {
 fn arrival(px: vec2i, cost: f32) -> u32 {
     let steps = f32(1u << (32u - INDEX_BITS)) - 1.0;
     let fit = 1u + u32((steps - 1.0) * (1.0 - clamp(cost / MOST_APART, 0.0, 1.0)));
-    return fit << INDEX_BITS | u32(px.y) * frame.size.x + u32(px.x);
+    return (fit << INDEX_BITS) | (u32(px.y) * frame.size.x + u32(px.x));
 }
 
 /// The pixel of a word.
