@@ -35,8 +35,8 @@ _of_thread: ContextVar[Gathering | None] = ContextVar("gathering", default=None)
 
 def _gathering(device: wgpu.GPUDevice) -> Gathering | None:
     """The gathering of this thread, if it is for this device."""
-    found = _of_thread.get()
-    return found if found is not None and found.device is device else None
+    gathering = _of_thread.get()
+    return gathering if gathering is not None and gathering.device is device else None
 
 
 @contextmanager
@@ -46,14 +46,14 @@ def gathered(device: wgpu.GPUDevice) -> Generator[None, None, None]:
     Before the CPU reads or writes, it is submitted, too (`submit`, `before_writing`).
     """
     if _of_thread.get() is not None:
-        yield  # it goes along with what is gathered around it
+        yield  # the outer gathering takes these commands, too
         return
     before = _of_thread.set(Gathering(device))
     try:
         yield
         before_writing(device)
     except BaseException:
-        with suppress(wgpu.GPUError):  # what is known to be drawn shall be, if the device is there
+        with suppress(wgpu.GPUError):  # others count on these commands, unless the device is lost
             before_writing(device)
         raise
     finally:
@@ -61,7 +61,7 @@ def gathered(device: wgpu.GPUDevice) -> Generator[None, None, None]:
 
 
 def encoder(device: wgpu.GPUDevice, label: str) -> wgpu.GPUCommandEncoder:
-    """An encoder for commands that are to be handed in: that of all, where they are gathered."""
+    """An encoder for commands to hand in: the common one where a thread gathers its commands."""
     gathering = _gathering(device)
     if gathering is None:
         return device.create_command_encoder(label=label)
@@ -69,20 +69,20 @@ def encoder(device: wgpu.GPUDevice, label: str) -> wgpu.GPUCommandEncoder:
 
 
 def hand_in(device: wgpu.GPUDevice, encoder: wgpu.GPUCommandEncoder) -> None:
-    """Submit what is recorded: now, or with all that is gathered."""
+    """Submit the commands of an encoder: now, or with all others of a gathering."""
     if encoder is not _gathering(device):
         submit(device, encoder)
 
 
 def before_writing(device: wgpu.GPUDevice) -> None:
-    """Submit what is gathered, if anything is: it may read what the CPU writes next."""
+    """Submit the gathered commands, if any: they may read memory that the CPU writes next."""
     gathering = _gathering(device)
     if gathering is not None and (encoders := gathering.taken()):
         submit(device, *encoders)
 
 
 def submit(device: wgpu.GPUDevice, *encoders: wgpu.GPUCommandEncoder) -> None:
-    """Submit what is gathered, and then the commands of these. The one place that submits."""
+    """Submit the gathered commands, and then these encoders. The one place that submits."""
     claim()
     gathering = _gathering(device)
     if gathering is not None:

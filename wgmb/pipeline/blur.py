@@ -295,7 +295,7 @@ class Blur:
         output: View,
         confidence: View | None = None,
     ) -> None:
-        """Record the method's passes, or play those of a frame that was as this one.
+        """Record the method's passes, or play the tape of an equal earlier frame.
 
         Encoders that take the time of passes get each pass by itself.
         """

@@ -15,7 +15,7 @@ TILE = _TILES.integer("TILE")  # px
 
 
 class MotionEdges:
-    """Those of the motion (height, width, 4) of a picture [px]."""
+    """The edges of the motion (height, width, 4) of a picture [px]."""
 
     def __init__(self, motion: np.ndarray):
         self._motion, self._changes = motion, changes(motion)
@@ -31,7 +31,7 @@ class MotionEdges:
         return any(self._has_edge(row, column, ways) for row, column in possible[largest])
 
     def _has_edge(self, row: int, column: int, ways: np.ndarray) -> bool:
-        """True if displacements in a tile differ as has_edge() of active_tiles.wgsl says."""
+        """True if displacements in a tile differ by has_edge() of active_tiles.wgsl."""
         rows, columns = (
             slice(max(0, n * TILE - RADIUS), (n + 1) * TILE + RADIUS) for n in (row, column)
         )
@@ -40,8 +40,8 @@ class MotionEdges:
 
 
 def _ways(shutter: Shutter, factors: tuple[float, float]) -> np.ndarray:
-    """(2, 2): shares of the vectors back and ahead that lead to where things are as it opens, and
-    as it closes, without their signs."""
+    """(2, 2): absolute shares of the vectors back and ahead in the displacement at the shutter's
+    opening (row 0) and at its closing (row 1)."""
     late = 0.5 * sum(map(abs, shutter.delay))
     opens, closes = shutter.span
     t = np.array([[opens - late], [closes + late]])

@@ -17,7 +17,7 @@ def choose(
     state: wgpu.GPUTextureView,
     output: wgpu.GPUTextureView,
 ) -> None:
-    """Record the motion that costs less: of `dense`, or `state`, that of the middle level.
+    """Record the cheaper motion at each place: `dense`, or `state` of the middle level.
 
     Unless the picture has both neighbours, places that the only one hides take the dominant
     motion.

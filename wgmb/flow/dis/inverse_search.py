@@ -22,7 +22,9 @@ QUALITIES = ("fast", "best")
 _LEAST = 32  # pixels a side below which OpenCV fails; smaller pictures are continued
 _HALVINGS = 2  # of the size at which "fast" ends, at most
 _ENDS_AT = 300  # px of the longer side below which "fast" does not end
-_REFINEMENTS = 1  # steps of variational refinement a level; five take twice as long, for nothing
+_REFINEMENTS = (
+    1  # steps of variational refinement a level; five take twice as long, at the same FLIP
+)
 _APART = 0.005  # per pixel that a motion is off that of most of the picture, by which it is nearer
 KEPT = 3  # pictures to either side of one whose motion is kept
 Pictures = Sequence[np.ndarray | None]

@@ -70,7 +70,7 @@ class Packed:
         return coming
 
     def _staging(self, size: int) -> wgpu.GPUBuffer:
-        """A buffer that no picture has; those of another size are forgotten."""
+        """A buffer that no picture uses; buffers of another size are dropped."""
         while self._free:
             if (one := self._free.pop()).size == size:
                 return one
